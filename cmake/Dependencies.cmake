@@ -1,0 +1,37 @@
+# Everything the daemon needs from outside, all of it in Debian 12; docs/dependencies.md says what each is for.
+include(CheckIncludeFileCXX)
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(tl-expected QUIET)
+if(NOT TARGET tl::expected)
+  find_path(TL_EXPECTED_INCLUDE_DIR tl/expected.hpp REQUIRED)
+  add_library(tl::expected INTERFACE IMPORTED)
+  target_include_directories(tl::expected INTERFACE "${TL_EXPECTED_INCLUDE_DIR}")
+endif()
+pkg_check_modules(TOMLPP REQUIRED IMPORTED_TARGET tomlplusplus)
+pkg_check_modules(SPNG REQUIRED IMPORTED_TARGET spng)
+pkg_check_modules(TURBOJPEG REQUIRED IMPORTED_TARGET libturbojpeg)
+# lcm.pc asks for GLib's development files, which nothing of LCM's headers needs.
+find_path(LCM_INCLUDE_DIR lcm/lcm-cpp.hpp REQUIRED)
+find_library(LCM_LIBRARY lcm REQUIRED)
+add_library(lcm::lcm UNKNOWN IMPORTED)
+set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION "${LCM_LIBRARY}" INTERFACE_INCLUDE_DIRECTORIES "${LCM_INCLUDE_DIR}")
+pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET libsystemd)
+find_program(LCM_GEN lcm-gen REQUIRED)
+
+# Debian puts OpenCV's CMake configuration into the package of all modules, which pulls in Qt, VTK and GDAL; the core module with its
+# universal intrinsics is all that the daemon needs, so it is found by hand.
+find_path(OPENCV_INCLUDE_DIR opencv2/core/hal/intrin.hpp PATH_SUFFIXES opencv4 REQUIRED)
+function(posed_find_opencv module)
+  if(NOT TARGET OpenCV::${module})
+    find_library(OPENCV_${module}_LIBRARY opencv_${module} REQUIRED)
+    add_library(OpenCV::${module} UNKNOWN IMPORTED)
+    set_target_properties(OpenCV::${module} PROPERTIES
+      IMPORTED_LOCATION "${OPENCV_${module}_LIBRARY}" INTERFACE_INCLUDE_DIRECTORIES "${OPENCV_INCLUDE_DIR}")
+  endif()
+endfunction()
+posed_find_opencv(core)

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "config/config.h"
+#include "core/result.h"
+
+namespace posed {
+
+/// Reads `path`, strictly: an unknown key, a wrong type, a value out of range, a duplicate or a syntax error is an error that names
+/// file, line, column, key, the value read and what is allowed. All mistakes of the file are reported, one a line. Also reads the
+/// camera calibration that the file names. Error code: InvalidConfig, or Io where a file cannot be read. Reentrant.
+Result<Config> load_config(const std::filesystem::path& path);
+
+/// As `load_config`, from text; `name` stands for the file in messages and its folder for relative paths.
+Result<Config> parse_config(const std::string& text, const std::filesystem::path& name);
+
+/// The built-in defaults with the camera calibration they name.
+Result<Config> default_config();
+
+/// Reads a camera calibration file as strictly. A relative `path` that does not exist is looked for in `calibration_folders()`.
+Result<CameraIntrinsics> load_camera(const std::filesystem::path& path);
+
+/// Where shipped calibrations are looked for, in this order: $POSED_CAMERA_PATH (colon-separated), the build's source tree, the
+/// installed data folder.
+std::vector<std::filesystem::path> calibration_folders();
+
+}  // namespace posed

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/clock.h"
+
+namespace posed {
+
+/// An event count. Lock-free, thread-safe.
+class Counter {
+ public:
+  void add(std::uint64_t n = 1) noexcept { value_.fetch_add(n, std::memory_order_relaxed); }
+  std::uint64_t value() const noexcept { return value_.load(std::memory_order_relaxed); }
+
+ private:
+  std::atomic<std::uint64_t> value_{0};
+};
+
+/// Quantiles of a set of durations. Plain data.
+struct LatencySummary {
+  std::uint64_t count = 0;
+  double mean_ms = 0;
+  double p50_ms = 0;
+  double p95_ms = 0;
+  double p99_ms = 0;
+  double p999_ms = 0;
+  double max_ms = 0;
+};
+
+/// Durations from 1 ns to over an hour in logarithmic buckets, each octave split in 32: a quantile is at most 3.2 % too high and
+/// never too low, and the maximum is exact. `record` is wait-free but for the maximum (lock-free) and does not allocate.
+/// Thread-safe; a summary taken during recording may miss the newest values.
+class LatencyHistogram {
+ public:
+  void record(TimeNs duration_ns) noexcept;
+  LatencySummary summary() const noexcept;
+  void reset() noexcept;
+
+ private:
+  static constexpr int kSubBucketBits = 5;
+  static constexpr int kOctaves = 42;  // 2^42 ns = 73 min
+  static constexpr std::size_t kBuckets = static_cast<std::size_t>(kOctaves) << kSubBucketBits;
+
+  static std::size_t bucket_of(std::uint64_t ns) noexcept;
+  static std::uint64_t upper_bound_ns(std::size_t bucket) noexcept;
+
+  std::array<std::atomic<std::uint64_t>, kBuckets> counts_{};
+  std::atomic<std::uint64_t> sum_ns_{0};
+  std::atomic<std::uint64_t> max_ns_{0};
+};
+
+/// Largest resident set of this process so far [bytes] (getrusage).
+std::uint64_t peak_rss_bytes();
+
+}  // namespace posed

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/result.h"
+
+namespace posed {
+
+enum class SchedulingPolicy { Normal, Fifo };
+
+/// How a thread is to run. What the system refuses degrades with one warning in the log, never with an error.
+struct ThreadOptions {
+  std::string name;  ///< shown by ps and top; the kernel keeps 15 characters
+  SchedulingPolicy policy = SchedulingPolicy::Normal;
+  int priority = 0;       ///< 1 to 99 for Fifo; ignored for Normal
+  std::vector<int> cpus;  ///< empty: any
+};
+
+/// A thread with a name, a policy and a stop token that joins when it is destroyed (after asking it to stop). Thread-bound: the
+/// object belongs to the thread that made it.
+class NamedThread {
+ public:
+  using Body = std::function<void(std::stop_token)>;
+
+  NamedThread() = default;
+  NamedThread(ThreadOptions options, Body body);
+
+  void request_stop() noexcept { thread_.request_stop(); }
+  void join() {
+    if (thread_.joinable()) {
+      thread_.join();
+    }
+  }
+  bool joinable() const noexcept { return thread_.joinable(); }
+
+ private:
+  std::jthread thread_;
+};
+
+/// Applies policy and affinity to the calling thread; the message of what was refused, where something was. Reentrant.
+Status apply_thread_options(const ThreadOptions& options);
+
+/// Name given to the calling thread by `NamedThread`, "" for others. Static storage: never allocates. Reentrant.
+const char* current_thread_name() noexcept;
+
+}  // namespace posed

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "core/clock.h"
+#include "core/se3.h"
+#include "slam/features.h"
+
+namespace posed {
+
+using LandmarkId = std::uint64_t;
+using KeyframeId = std::uint64_t;
+constexpr LandmarkId kNoLandmark = 0;  ///< identifiers start at 1
+constexpr KeyframeId kNoKeyframe = 0;
+
+/// A frame as the tracker hands it to the mapper: its features, where they lie in space, and which landmarks they were matched to.
+/// Index i of every vector is one keypoint. The vectors keep their capacity when a record is reused.
+struct KeyframeRecord {
+  KeyframeId id = kNoKeyframe;  ///< given by the tracker, counting from 1
+  std::uint64_t sequence = 0;   ///< of the frame
+  TimeNs capture_ns = 0;
+  Se3 T_map_camera;
+  Matrix6d covariance = Matrix6d::Zero();  ///< as in PoseEstimate
+  bool starts_map = false;                 ///< first keyframe of a new map: what came before is unrelated to it
+  std::uint32_t map_id = 0;
+
+  Features features;
+  std::vector<Eigen::Vector2f> ideal_pixels;  ///< undistorted keypoints
+  std::vector<float> depth_m;                 ///< 0 where the sensor saw none
+  std::vector<LandmarkId> landmarks;          ///< matched landmark, or kNoLandmark
+};
+
+}  // namespace posed

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <memory>
+
+#include "config/config.h"
+#include "core/image_view.h"
+#include "slam/features.h"
+
+namespace posed {
+
+/// ORB features: FAST-9 corners on an image pyramid, spread over the image by a quad-tree, oriented by the intensity centroid and
+/// described by rotated BRIEF. Sources: Rublee et al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011; Rosten and Drummond,
+/// "Machine learning for high-speed corner detection", ECCV 2006 (FAST); quad-tree distribution as described in Mur-Artal, Montiel,
+/// Tardos, "ORB-SLAM", T-RO 2015, section III-B.
+///
+/// All buffers are allocated at construction: `extract` does not allocate once its output vectors have grown, takes no lock and
+/// starts no thread. All arithmetic that decides anything is integer or of fixed order, so the result is the same on every instruction
+/// set (the SIMD kernels are chosen at construction by what the processor offers). Reentrant: one extractor a thread.
+class OrbExtractor {
+ public:
+  OrbExtractor(const TrackerConfig& config, int width, int height);
+  ~OrbExtractor();
+  OrbExtractor(OrbExtractor&&) noexcept;
+
+  /// Replaces `features` by those of `gray`, whose size is that of construction; at most `config.features` (a few more where the
+  /// quad-tree's last split gives them), ordered by level, then by position: a function of the pixels alone.
+  void extract(ImageView<const std::uint8_t> gray, Features& features);
+
+ private:
+  struct Workspace;
+  std::unique_ptr<Workspace> workspace_;
+};
+
+}  // namespace posed

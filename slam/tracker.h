@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+
+#include "config/config.h"
+#include "core/estimates.h"
+#include "core/rgbd_frame.h"
+#include "slam/keyframe_record.h"
+#include "slam/map_snapshot.h"
+
+namespace posed {
+
+/// Tracks the camera, frame by frame, against a snapshot of the map. Never waits, takes no lock and, after the first frames, does not
+/// allocate; it is bounded in time by the number of features and landmarks. A function of its inputs alone: the same frames with the
+/// same snapshots give the same bits. Thread-bound: one thread calls `track`.
+class Tracker {
+ public:
+  Tracker(const TrackerConfig& config, const CameraIntrinsics& camera, const Se3& T_map_camera_start);
+  ~Tracker();
+
+  /// The pose of `frame`. Where the frame should become a keyframe and `candidate` is not null, fills `*candidate` and says so in
+  /// `PoseEstimate::keyframe`; the caller then hands it to the mapper. A null `candidate` (the mapper is behind) only delays it.
+  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate);
+
+  /// Time spent in the parts of the last `track` [ns].
+  struct Timing {
+    TimeNs extract_ns = 0;
+    TimeNs match_ns = 0;
+    TimeNs solve_ns = 0;
+  };
+  const Timing& last_timing() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace posed
