@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/estimates.h"
+#include "core/metrics.h"
+
+namespace posed {
+
+/// State, counters and latencies of a running pipeline at one instant. Counters only grow. Plain data.
+struct HealthReport {
+  TrackingState state = TrackingState::Initializing;
+  bool source_failed = false;
+  bool source_ended = false;
+
+  std::uint64_t frames_captured = 0;  ///< frames that reached the pool
+  std::uint64_t frames_skipped = 0;   ///< bad frames of the source, left out
+  std::uint64_t frames_no_slot = 0;   ///< lost because the frame pool was exhausted
+  std::uint64_t frames_dropped = 0;   ///< handed back by the full queue before the tracker
+  std::uint64_t frames_tracked = 0;   ///< with a pose
+  std::uint64_t frames_lost = 0;      ///< processed, without a pose
+  std::uint64_t keyframes = 0;        ///< handed to the mapper
+  std::uint64_t keyframes_delayed = 0;  ///< frames on which the mapper's queue was full
+  std::uint64_t poses_published = 0;
+  std::uint64_t poses_dropped = 0;    ///< handed back by the full queue before the publisher
+  std::uint64_t publish_errors = 0;
+  bool transport_up = false;          ///< LCM runs
+
+  std::size_t map_keyframes = 0;
+  std::size_t map_landmarks = 0;
+
+  LatencySummary track;    ///< time in the tracker a frame
+  LatencySummary latency;  ///< capture to publish
+  LatencySummary map;      ///< time in the mapper a keyframe
+  std::uint64_t peak_rss_bytes = 0;
+};
+
+}  // namespace posed
