@@ -38,15 +38,7 @@ struct Links {
       : frames(size_of(config.pipeline.frame_queue)),
         keyframes(size_of(config.pipeline.keyframe_queue)),
         estimates(size_of(config.pipeline.publish_queue)) {
-    // Quad-tree distribution may end a few keypoints above what was asked; twice is room for good.
-    const std::size_t features = 2 * size_of(config.tracker.features);
-    keyframes.ring.prepare([&](KeyframeRecord& record) {
-      record.features.keypoints.reserve(features);
-      record.features.descriptors.reserve(features);
-      record.ideal_pixels.reserve(features);
-      record.depth_m.reserve(features);
-      record.landmarks.reserve(features);
-    });
+    keyframes.ring.prepare([&](KeyframeRecord& record) { record.reserve(feature_capacity(config.tracker.features)); });
     snapshots.prepare([&](MapSnapshot& snapshot) {
       snapshot.landmarks.reserve(size_of(config.mapper.local_landmarks));
       snapshot.keyframes.reserve(size_of(config.mapper.recovery_keyframes));

@@ -11,7 +11,7 @@ class SlamTracker final : public FrameTracker {
  public:
   explicit SlamTracker(const Config& config)
       // T_map_start places base at start; the tracker thinks in the camera's frame.
-      : tracker_(config.tracker, config.intrinsics, config.camera.T_map_start * config.camera.T_base_camera) {}
+      : tracker_(config.tracker, config.mapper, config.intrinsics, config.camera.T_map_start * config.camera.T_base_camera) {}
 
   PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) override {
     return tracker_.track(frame, map, candidate);
