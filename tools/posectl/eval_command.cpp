@@ -9,7 +9,7 @@
 #include "tools/posectl/commands.h"
 #include "tools/posectl/exit_code.h"
 #include "tools/posectl/report_error.h"
-#include "tools/posectl/text_file.h"
+#include "tools/posectl/whole_file.h"
 #include "tools/posectl/trajectory.h"
 #include "tools/posectl/trajectory_error.h"
 #include "tools/posectl/trajectory_plot.h"
@@ -72,10 +72,10 @@ int run_eval(const EvalOptions& options, const Console& console) {
     return error.error().code == ErrorCode::InvalidArgument ? kExitNegative : exit_code_of(error.error().code);
   }
   print_table(*error, console.out);
-  if (const Status status = options.json.empty() ? Status{} : write_text_file(options.json, to_json(*error)); !status) {
+  if (const Status status = options.json.empty() ? Status{} : write_whole_file(options.json, to_json(*error)); !status) {
     return report_error(console.err, status.error());
   }
-  if (const Status status = options.plot.empty() ? Status{} : write_text_file(options.plot, plot_trajectories(*truth, *error));
+  if (const Status status = options.plot.empty() ? Status{} : write_whole_file(options.plot, plot_trajectories(*truth, *error));
       !status) {
     return report_error(console.err, status.error());
   }

@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "tools/posectl/text_file.h"
+#include "tools/posectl/whole_file.h"
 
 namespace posed {
 namespace {
@@ -161,7 +161,7 @@ Result<Trajectory> parse_trajectory(std::string_view text, std::string_view name
 }
 
 Result<Trajectory> read_trajectory(const std::filesystem::path& path) {
-  const Result<std::string> text = read_text_file(path);
+  const Result<std::string> text = read_whole_file(path);
   if (!text) {
     return tl::unexpected(text.error());
   }
@@ -180,7 +180,7 @@ std::string format_trajectory(const Trajectory& trajectory) {
 }
 
 Result<std::vector<std::int64_t>> read_frame_stamps(const std::filesystem::path& path) {
-  const Result<std::string> text = read_text_file(path);
+  const Result<std::string> text = read_whole_file(path);
   if (!text) {
     return tl::unexpected(text.error());
   }

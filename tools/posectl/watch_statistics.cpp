@@ -108,9 +108,11 @@ std::string format_watch_table(const WatchStatistics& statistics, const std::opt
   return health ? table + health_table(*health) : table + "daemon     no status received yet\n";
 }
 
-std::string format_watch_line(const PoseSample& sample) {
-  return fmt::format("{}  {}  {}  {}  inliers {}  {:.1f} ms", sample.sequence, to_string(sample.state), position_text(sample),
-                     rotation_text(sample), sample.inliers, to_ms(sample.publish_ns - sample.capture_ns));
+std::string format_watch_line(const WatchStatistics& statistics) {
+  const PoseSample& last = statistics.last;
+  return fmt::format("frame {}  {}  {}  inliers {}  {:.1f} Hz  {:.1f} ms  received {}  missing {}", last.sequence, to_string(last.state),
+                     position_text(last), last.inliers, statistics.rate_hz, to_ms(last.publish_ns - last.capture_ns), statistics.received,
+                     statistics.sequence.missing());
 }
 
 std::string format_watch_summary(const WatchStatistics& statistics) {

@@ -78,8 +78,8 @@ struct WatchStatistics {
 /// The live table, one line an item, each ended. `health` is the daemon's last report, if one was received.
 std::string format_watch_table(const WatchStatistics& statistics, const std::optional<HealthReport>& health);
 
-/// One pose on one line, without its end: what is printed where there is no terminal.
-std::string format_watch_line(const PoseSample& sample);
+/// The last pose and the counts on one line, without its end: what is printed now and then where there is no terminal.
+std::string format_watch_line(const WatchStatistics& statistics);
 
 /// "received N poses (T tracked), M gaps in sequence (K missing), ..." and latencies.
 std::string format_watch_summary(const WatchStatistics& statistics);

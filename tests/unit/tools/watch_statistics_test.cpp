@@ -120,6 +120,14 @@ TEST(WatchTable, ShowsNoNumbersWhereThereIsNoPose) {
   EXPECT_THAT(table, HasSubstr("no status received yet"));
 }
 
+TEST(WatchLine, HoldsPoseAndCounts) {
+  WatchStatistics statistics(std::nullopt);
+  statistics.observe(sample(0));
+  statistics.observe(sample(2));
+  EXPECT_EQ(format_watch_line(statistics),
+            "frame 2  tracking  +0.100 -0.200 +1.500 m  sigma 2.1 mm  inliers 380  12.5 Hz  10.0 ms  received 2  missing 1");
+}
+
 TEST(WatchSummary, NamesWhatWasReceivedAndMissed) {
   WatchStatistics statistics(std::nullopt);
   for (const int i : {0, 1, 2, 5}) {

@@ -10,7 +10,7 @@
 namespace posed {
 
 /// Errors: NotFound, or Io with the system's reason.
-Result<std::string> read_text_file(const std::filesystem::path& path);
+Result<std::string> read_whole_file(const std::filesystem::path& path);
 
 /// Whether `path` could be written: its folder exists and may be written to, and it is not a folder itself. To be asked before a
 /// long run. Error: Io.
@@ -18,6 +18,6 @@ Status check_writable(const std::filesystem::path& path);
 
 /// Writes a file beside `path` and renames it, so that a reader sees the old file or the whole new one. What is not a regular file
 /// (/dev/stdout, a pipe) is written to directly. Error: Io.
-Status write_text_file(const std::filesystem::path& path, std::string_view contents);
+Status write_whole_file(const std::filesystem::path& path, std::string_view contents);
 
 }  // namespace posed

@@ -1,4 +1,4 @@
-#include "tools/posectl/text_file.h"
+#include "tools/posectl/whole_file.h"
 
 #include <array>
 #include <cerrno>
@@ -65,7 +65,7 @@ fs::path folder_of(const fs::path& path) {
 
 }  // namespace
 
-Result<std::string> read_text_file(const fs::path& path) {
+Result<std::string> read_whole_file(const fs::path& path) {
   FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) {
     return system_error("open", path, errno);
@@ -104,7 +104,7 @@ Status check_writable(const fs::path& path) {
   return {};
 }
 
-Status write_text_file(const fs::path& path, std::string_view contents) {
+Status write_whole_file(const fs::path& path, std::string_view contents) {
   std::error_code ignored;
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) {
     FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));

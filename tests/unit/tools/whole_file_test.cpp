@@ -1,4 +1,4 @@
-#include "tools/posectl/text_file.h"
+#include "tools/posectl/whole_file.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -15,27 +15,27 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(TextFile, ReturnsWhatWasWritten) {
+TEST(WholeFile, ReturnsWhatWasWritten) {
   const TemporaryFolder folder;
   const std::string contents(200'000, 'x');
-  ASSERT_TRUE(write_text_file(folder / "a.txt", contents));
-  EXPECT_EQ(read_text_file(folder / "a.txt"), contents);
+  ASSERT_TRUE(write_whole_file(folder / "a.txt", contents));
+  EXPECT_EQ(read_whole_file(folder / "a.txt"), contents);
 }
 
-TEST(TextFile, ReplacesAndLeavesNothingElseBehind) {
+TEST(WholeFile, ReplacesAndLeavesNothingElseBehind) {
   const TemporaryFolder folder;
   folder.write("a.txt", "old and longer");
-  ASSERT_TRUE(write_text_file(folder / "a.txt", "new"));
+  ASSERT_TRUE(write_whole_file(folder / "a.txt", "new"));
   EXPECT_EQ(contents_of(folder / "a.txt"), "new");
   const std::filesystem::directory_iterator entries(folder.path());
   EXPECT_EQ(std::distance(begin(entries), end(entries)), 1);
 }
 
-TEST(TextFile, AFailedWriteKeepsTheOldFileAndRemovesItsOwn) {
+TEST(WholeFile, AFailedWriteKeepsTheOldFileAndRemovesItsOwn) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder.path() / "target" / "not_empty");
   // Renaming a file over a folder fails, after the temporary file was written.
-  const Status status = write_text_file(folder / "target", "text");
+  const Status status = write_whole_file(folder / "target", "text");
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::Io);
   EXPECT_TRUE(std::filesystem::is_directory(folder.path() / "target" / "not_empty"));
@@ -43,26 +43,26 @@ TEST(TextFile, AFailedWriteKeepsTheOldFileAndRemovesItsOwn) {
   EXPECT_EQ(std::distance(begin(entries), end(entries)), 1);
 }
 
-TEST(TextFile, WritesToDevicesDirectly) {
-  EXPECT_TRUE(write_text_file("/dev/null", "text"));
+TEST(WholeFile, WritesToDevicesDirectly) {
+  EXPECT_TRUE(write_whole_file("/dev/null", "text"));
 }
 
-TEST(TextFile, ReportsAFullDisk) {
-  const Status status = write_text_file("/dev/full", "text");
+TEST(WholeFile, ReportsAFullDisk) {
+  const Status status = write_whole_file("/dev/full", "text");
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::Io);
   EXPECT_THAT(status.error().message, HasSubstr("/dev/full"));
 }
 
-TEST(TextFile, AMissingFileIsNotFound) {
-  const Result<std::string> text = read_text_file("/nonexistent/file");
+TEST(WholeFile, AMissingFileIsNotFound) {
+  const Result<std::string> text = read_whole_file("/nonexistent/file");
   ASSERT_FALSE(text);
   EXPECT_EQ(text.error().code, ErrorCode::NotFound);
   EXPECT_THAT(text.error().message, HasSubstr("/nonexistent/file"));
 }
 
-TEST(TextFile, AFolderCannotBeRead) {
-  const Result<std::string> text = read_text_file("/");
+TEST(WholeFile, AFolderCannotBeRead) {
+  const Result<std::string> text = read_whole_file("/");
   ASSERT_FALSE(text);
   EXPECT_EQ(text.error().code, ErrorCode::Io);
 }
