@@ -12,8 +12,8 @@
 
 namespace posed {
 
-/// Keeps what the tracker said of each frame, to write trajectories from. Thread-bound at any one time: the pipeline's publisher thread
-/// records; once the pipeline has stopped, its owner reads.
+/// Keeps what the tracker said of each frame, to write trajectories from. Thread-bound at any one time: the pipeline's publisher
+/// thread records; once the pipeline has stopped, its owner reads.
 class EstimateRecorder {
  public:
   explicit EstimateRecorder(std::size_t expected_frames) { records_.reserve(expected_frames); }

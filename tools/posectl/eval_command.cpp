@@ -9,10 +9,10 @@
 #include "tools/posectl/commands.h"
 #include "tools/posectl/exit_code.h"
 #include "tools/posectl/report_error.h"
-#include "tools/posectl/whole_file.h"
 #include "tools/posectl/trajectory.h"
 #include "tools/posectl/trajectory_error.h"
 #include "tools/posectl/trajectory_plot.h"
+#include "tools/posectl/whole_file.h"
 
 namespace posed {
 namespace {

@@ -39,7 +39,8 @@ struct WatchOptions {
   std::optional<std::int64_t> first_sequence;
 };
 
-/// A larger socket buffer than the system's default, so that a busy machine loses no message; where the URL asks for one, that counts.
+/// A larger socket buffer than the system's default, so that a busy machine loses no message; where the URL asks for one, that
+/// counts.
 std::string receiving_url(const std::string& url) {
   if (!url.starts_with("udpm://") || url.find("recv_buf_size") != std::string::npos) {
     return url;
@@ -80,10 +81,11 @@ class Watcher {
 
 Status Watcher::open() {
   if (!lcm_.good()) {
-    return make_error(ErrorCode::Unavailable,
-                      fmt::format("LCM cannot start on '{}'; where the machine has no multicast route, give it one: 'ip link set lo multicast "
-                                  "on' and 'ip route add 224.0.0.0/4 dev lo' (as root)",
-                                  options_.url));
+    return make_error(
+        ErrorCode::Unavailable,
+        fmt::format("LCM cannot start on '{}'; where the machine has no multicast route, give it one: 'ip link set lo multicast "
+                    "on' and 'ip route add 224.0.0.0/4 dev lo' (as root)",
+                    options_.url));
   }
   if (!options_.csv.empty()) {
     if (const Status status = check_writable(options_.csv); !status) {
@@ -169,8 +171,8 @@ int Watcher::conclude() {
     return report_error(console_.err, {ErrorCode::Io, fmt::format("cannot write {}", options_.csv.string())});
   }
   if (statistics_.received == 0) {
-    fmt::print(console_.err, "posectl: no pose came on channel {}POSE of '{}'; is posed running, with the same URL and prefix?\n", options_.prefix,
-               options_.url);
+    fmt::print(console_.err, "posectl: no pose came on channel {}POSE of '{}'; is posed running, with the same URL and prefix?\n",
+               options_.prefix, options_.url);
     return kExitNegative;
   }
   const bool all_came = options_.count == 0 || complete();
@@ -197,7 +199,8 @@ void add_watch_command(CLI::App& parent, const Console& console, int& exit_code)
       "watch", "Show the poses and the health that a daemon publishes. Exit code 1 where frames are missing in their sequence");
   command->add_option("--url", options->url, "LCM's URL, as in publisher.url")->capture_default_str();
   command->add_option("--prefix", options->prefix, "Channel prefix, as in publisher.channel_prefix")->capture_default_str();
-  command->add_option("--count", options->count, "End after so many poses; fewer (see --timeout) give exit code 1")->check(CLI::PositiveNumber);
+  command->add_option("--count", options->count, "End after so many poses; fewer (see --timeout) give exit code 1")
+      ->check(CLI::PositiveNumber);
   command->add_option("--timeout", options->timeout_s, "End when no message has come for so long [s]")->check(CLI::PositiveNumber);
   command->add_option("--csv", options->csv, "Write every pose to this file, as it comes");
   command->add_option("--expect-from-sequence", options->first_sequence,

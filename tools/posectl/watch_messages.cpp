@@ -16,7 +16,9 @@ TrackingState state_of(std::int8_t state) {
   }
 }
 
-std::uint64_t count_of(std::int64_t value) { return static_cast<std::uint64_t>(value); }
+std::uint64_t count_of(std::int64_t value) {
+  return static_cast<std::uint64_t>(value);
+}
 
 LatencySummary latency_of(const latency_t& message) {
   return {.count = count_of(message.count),

@@ -110,9 +110,9 @@ std::string format_watch_table(const WatchStatistics& statistics, const std::opt
 
 std::string format_watch_line(const WatchStatistics& statistics) {
   const PoseSample& last = statistics.last;
-  return fmt::format("frame {}  {}  {}  inliers {}  {:.1f} Hz  {:.1f} ms  received {}  missing {}", last.sequence, to_string(last.state),
-                     position_text(last), last.inliers, statistics.rate_hz, to_ms(last.publish_ns - last.capture_ns), statistics.received,
-                     statistics.sequence.missing());
+  return fmt::format("frame {}  {}  {}  inliers {}  {:.1f} Hz  {:.1f} ms  received {}  missing {}", last.sequence,
+                     to_string(last.state), position_text(last), last.inliers, statistics.rate_hz,
+                     to_ms(last.publish_ns - last.capture_ns), statistics.received, statistics.sequence.missing());
 }
 
 std::string format_watch_summary(const WatchStatistics& statistics) {
