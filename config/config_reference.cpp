@@ -1,5 +1,6 @@
 #include "config/config_reference.h"
 
+#include <algorithm>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -23,7 +24,7 @@ before it touches a device. `posed --check-config FILE` only checks.
 - Limits are inclusive.
 - A *pose* `T_a_b` is the array `[x, y, z, qx, qy, qz, qw]`: metres, then a quaternion whose norm is 1 within 0.001. It maps coordinates
   in b to coordinates in a.
-- *Live*: a running daemon takes a new value; all other keys need a restart.
+- *Live*: whether a running daemon takes a new value; otherwise it needs a restart.
 )";
 
 constexpr std::string_view kCameraStart = R"(

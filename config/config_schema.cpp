@@ -77,11 +77,7 @@ class SchemaBuilder {
     return *this;
   }
 
-  /// Marks the key added last.
-  SchemaBuilder& live() {
-    schema_.back().keys.back().live = true;
-    return *this;
-  }
+  /// The file must have the key added last.
   SchemaBuilder& required() {
     schema_.back().keys.back().required = true;
     return *this;
@@ -174,7 +170,6 @@ void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {
       .key("channel_prefix", TextField{&c.channel_prefix, {"at most 31 letters, digits and underscores", is_channel_prefix}}, "",
            "What the names of all channels begin with.")
       .key("status_period_s", real(c.status_period_s, 0.1, 60.0), "s", "Time between two status messages.")
-      .live()
       .key("retry_period_s", real(c.retry_period_s, 0.1, 3600.0), "s",
            "Time between two attempts to start LCM, where it cannot start.")
       .key("bot_core_pose", BoolField{&c.bot_core_pose}, "",
@@ -220,8 +215,7 @@ Schema config_schema(Config& config) {
   add_pipeline(schema, config.pipeline);
   schema.section("logging", "Messages for people, on standard error.")
       .key("level", choice(config.logging.level, {"debug", "info", "warning", "error", "off"}), "",
-           "Least severe messages that are shown.")
-      .live();
+           "Least severe messages that are shown.");
   return std::move(schema).build();
 }
 

@@ -17,7 +17,7 @@ struct SchemaKey {
   std::string_view unit;  ///< empty where there is none
   std::string_view description;
   bool required = false;  ///< the file must have it
-  bool live = false;      ///< a running daemon takes a new value without a restart
+  bool live = false;      ///< a running daemon takes a new value; the others need a restart
 };
 
 struct SchemaSection {

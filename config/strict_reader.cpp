@@ -106,7 +106,7 @@ void StrictReader::note_unknown(const TomlEntry& entry) {
   } else if (!neighbours.empty()) {
     hint = fmt::format("allowed here: {}", fmt::join(neighbours, ", "));
   } else {
-    hint = "it belongs to no table that is known";
+    hint = "allowed are only keys in tables, such as [tracker]";
   }
   note(entry.position, is_table ? fmt::format("{}: unknown table; {}", entry.key, hint)
                                 : fmt::format("{}: {}: unknown key; {}", entry.key, brief_text(entry.value), hint));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 // The header-only form, so that sanitizers and fuzzers see into the parser; errors come back as values.
@@ -66,6 +67,43 @@ void flatten(const toml::table& table, const std::string& prefix, int depth, std
   }
 }
 
+/// Bytes of the UTF-8 sequence at the start of `text`, 0 where there is none. Source: the table of well-formed sequences, Unicode 15,
+/// section 3.9, table 3-7.
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned>(static_cast<unsigned char>(text[i])) : 0U; };
+  const auto in = [](unsigned value, unsigned low, unsigned high) { return value >= low && value <= high; };
+  const unsigned lead = byte(0);
+  if (lead < 0x80) {
+    return 1;
+  }
+  const std::size_t length = in(lead, 0xC2, 0xDF) ? 2 : in(lead, 0xE0, 0xEF) ? 3 : in(lead, 0xF0, 0xF4) ? 4 : 0;
+  const unsigned low = lead == 0xE0 ? 0xA0 : lead == 0xF0 ? 0x90 : 0x80;
+  const unsigned high = lead == 0xED ? 0x9F : lead == 0xF4 ? 0x8F : 0xBF;
+  if (length == 0 || !in(byte(1), low, high)) {
+    return 0;
+  }
+  for (std::size_t i = 2; i < length; ++i) {
+    if (!in(byte(i), 0x80, 0xBF)) {
+      return 0;
+    }
+  }
+  return length;
+}
+
+/// Where `text` stops being UTF-8. The parser notices too, but looks at blocks of bytes and cannot say where.
+std::optional<TextPosition> find_invalid_utf8(std::string_view text) {
+  TextPosition position{1, 1};
+  while (!text.empty()) {
+    const std::size_t length = utf8_length(text);
+    if (length == 0) {
+      return position;
+    }
+    position = text.front() == '\n' ? TextPosition{position.line + 1, 1} : TextPosition{position.line, position.column + 1};
+    text.remove_prefix(length);
+  }
+  return std::nullopt;
+}
+
 /// The parser begins its messages with "Error while parsing <what>: ".
 std::string without_preamble(std::string_view description) {
   constexpr std::string_view kPreamble = "Error while parsing ";
@@ -93,6 +131,9 @@ std::string array_text(const std::vector<TomlValue>& elements) {
 }  // namespace
 
 tl::expected<std::vector<TomlEntry>, TomlSyntaxError> read_toml(std::string_view text) {
+  if (const std::optional<TextPosition> position = find_invalid_utf8(text)) {
+    return tl::unexpected(TomlSyntaxError{*position, "not UTF-8 text"});
+  }
   const toml::parse_result parsed = toml::parse(text);
   if (!parsed) {
     const toml::parse_error& error = parsed.error();
