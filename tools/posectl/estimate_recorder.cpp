@@ -3,6 +3,7 @@
 namespace posed {
 
 void EstimateRecorder::record(const PoseEstimate& estimate) {
+  frames_.push_back({estimate.sequence, estimate.stamp_utc_ns});
   if (estimate.has_pose()) {
     records_.push_back({estimate.stamp_utc_ns, estimate.T_map_camera(), estimate.reference_keyframe, estimate.T_reference_camera});
   }

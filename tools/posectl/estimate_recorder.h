@@ -16,7 +16,10 @@ namespace posed {
 /// thread records; once the pipeline has stopped, its owner reads.
 class EstimateRecorder {
  public:
-  explicit EstimateRecorder(std::size_t expected_frames) { records_.reserve(expected_frames); }
+  explicit EstimateRecorder(std::size_t expected_frames) {
+    records_.reserve(expected_frames);
+    frames_.reserve(expected_frames);
+  }
 
   void record(const PoseEstimate& estimate);
 
@@ -30,7 +33,12 @@ class EstimateRecorder {
   /// T_map_camera rebuilt from where the reference keyframes are now.
   Final final_trajectory(const std::function<std::optional<Se3>(std::uint64_t)>& keyframe_pose) const;
 
-  std::size_t size() const { return records_.size(); }
+  struct Frame {
+    std::uint64_t sequence = 0;
+    std::int64_t stamp_utc_ns = 0;
+  };
+  /// Every frame that was processed, with a pose or without, in order.
+  const std::vector<Frame>& frames() const { return frames_; }
 
  private:
   struct Record {
@@ -40,6 +48,7 @@ class EstimateRecorder {
     Se3 T_reference_camera;
   };
   std::vector<Record> records_;  // of frames with a pose
+  std::vector<Frame> frames_;
 };
 
 }  // namespace posed

@@ -14,6 +14,7 @@
 
 #include "core/clock.h"
 #include "daemon/app.h"
+#include "drivers/synthetic_camera.h"
 #include "tools/posectl/commands.h"
 #include "tools/posectl/estimate_recorder.h"
 #include "tools/posectl/exit_code.h"
@@ -36,10 +37,11 @@ struct ReplayOptions {
   std::filesystem::path trajectory;
   std::filesystem::path online_trajectory;
   std::filesystem::path stats;
+  std::filesystem::path groundtruth;
   bool publish = false;
   bool quiet = false;
 
-  std::vector<std::filesystem::path> outputs() const { return {trajectory, online_trajectory, stats}; }
+  std::vector<std::filesystem::path> outputs() const { return {trajectory, online_trajectory, stats, groundtruth}; }
 };
 
 /// What the source complained of: the first few messages, and the last one, which tells why it failed. Thread-safe.
@@ -104,6 +106,26 @@ Result<ReplayStats> run_to_end(App& app, const ReplayOptions& options, const Con
   return stats;
 }
 
+/// The true pose of every frame that the tracker saw: the synthetic camera's own, by the frame's number.
+Result<Trajectory> synthetic_truth(const Config& config, const EstimateRecorder& recorder) {
+  const Result<std::unique_ptr<SyntheticCamera>> camera = SyntheticCamera::create(config.source.synthetic, config.intrinsics);
+  if (!camera) {
+    return tl::unexpected(camera.error());
+  }
+  Trajectory truth;
+  truth.reserve(recorder.frames().size());
+  for (const EstimateRecorder::Frame& frame : recorder.frames()) {
+    truth.push_back({frame.stamp_utc_ns, (*camera)->pose(frame.sequence)});
+  }
+  return truth;
+}
+
+Status write_truth(const std::filesystem::path& path, const Config& config, const EstimateRecorder& recorder) {
+  return synthetic_truth(config, recorder).and_then([&path](const Trajectory& truth) {
+    return write_whole_file(path, format_trajectory(truth));
+  });
+}
+
 Status write_outputs(const ReplayOptions& options, const ReplayStats& stats, const EstimateRecorder& recorder, const App& app,
                      std::ostream& err) {
   const EstimateRecorder::Final final_poses =
@@ -120,15 +142,26 @@ Status write_outputs(const ReplayOptions& options, const ReplayStats& stats, con
       .and_then([&] { return write(options.stats, to_json(stats)); });
 }
 
-int run_replay(const ReplayOptions& options, const Console& console) {
+/// What can be known to be wrong before anything runs.
+Status check_before_run(const ReplayOptions& options, const Config& config) {
+  if (!options.groundtruth.empty() && config.source.kind != SourceKind::Synthetic) {
+    return make_error(ErrorCode::InvalidArgument, "--groundtruth: only the synthetic world knows the true poses");
+  }
   for (const std::filesystem::path& output : options.outputs()) {
-    if (const Status status = output.empty() ? Status{} : check_writable(output); !status) {
-      return report_error(console.err, status.error());
+    if (Status status = output.empty() ? Status{} : check_writable(output); !status) {
+      return status;
     }
   }
+  return {};
+}
+
+int run_replay(const ReplayOptions& options, const Console& console) {
   const Result<Config> config = make_replay_config(options.source);
   if (!config) {
     return report_error(console.err, config.error());
+  }
+  if (const Status status = check_before_run(options, *config); !status) {
+    return report_error(console.err, status.error());
   }
   SourceErrors source_errors;
   std::optional<EstimateRecorder> recorder;
@@ -147,8 +180,11 @@ int run_replay(const ReplayOptions& options, const Console& console) {
     return report_error(console.err, stats.error());
   }
   source_errors.print(console.err);
-  if (const Status status = write_outputs(options, *stats, *recorder, **app, console.err); !status) {
-    return report_error(console.err, status.error());
+  const Status written = write_outputs(options, *stats, *recorder, **app, console.err).and_then([&] {
+    return options.groundtruth.empty() ? Status{} : write_truth(options.groundtruth, *config, *recorder);
+  });
+  if (!written) {
+    return report_error(console.err, written.error());
   }
   fmt::print(console.out, "{}", format_replay_summary(*stats));
   if (stats->health.source_failed) {
@@ -198,6 +234,8 @@ void add_replay_command(CLI::App& parent, const Console& console, int& exit_code
   command->add_option("--online-trajectory", options->online_trajectory,
                       "Write the poses as they were published at the time (TUM format)");
   command->add_option("--stats", options->stats, "Write counters and latencies (JSON)");
+  command->add_option("--groundtruth", options->groundtruth,
+                      "Synthetic: write the true pose of every processed frame (TUM format)");
   command->add_flag("--publish", options->publish, "Publish over LCM, too");
   command->add_flag("--quiet", options->quiet, "No progress");
   command->callback([options, &console, &exit_code] { exit_code = run_replay(*options, console); });
