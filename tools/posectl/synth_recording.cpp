@@ -11,8 +11,8 @@
 #include "core/frame_pool.h"
 #include "drivers/image_writer.h"
 #include "drivers/synthetic_camera.h"
+#include "drivers/tum_list.h"
 #include "drivers/tum_writer.h"
-#include "tools/posectl/trajectory.h"
 #include "tools/posectl/whole_file.h"
 
 namespace posed {
@@ -32,7 +32,7 @@ Status write_frame(SyntheticCamera& camera, std::uint64_t index, RgbdFrame& fram
   const int width = camera.intrinsics().width;
   const ImageView<std::uint8_t> mask{mask_pixels.data(), width, camera.intrinsics().height, width, 1};
   return camera.render(index, frame, mask).and_then([&] { return writer.add_frame(frame); }).and_then([&] {
-    return write_png_gray8(masks / (format_trajectory_stamp(frame.stamp_utc_ns) + ".png"), mask);
+    return write_png_gray8(masks / (format_stamp(frame.stamp_utc_ns) + ".png"), mask);
   });
 }
 

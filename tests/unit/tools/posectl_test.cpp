@@ -1,9 +1,8 @@
 #include "tools/posectl/posectl.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
-#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>

@@ -1,6 +1,8 @@
 #include "tools/posectl/progress.h"
 
+#include <algorithm>
 #include <sstream>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 #include "tools/posectl/whole_file.h"
 
-#include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <string>
 #include <unistd.h>
 
