@@ -11,8 +11,8 @@ documented=$(sed -n 's/^| `\([a-z0-9.+-]*\)` |.*/\1/p' docs/dependencies.md | LC
 undocumented=$(LC_ALL=C comm -23 <(echo "$installed") <(echo "$documented"))
 unlisted=$(LC_ALL=C comm -13 <(echo "$installed") <(echo "$documented"))
 if [ -n "$undocumented$unlisted" ]; then
-  [ -z "$undocumented" ] || echo "not in docs/dependencies.md:" $undocumented >&2
-  [ -z "$unlisted" ] || echo "not in tools/lib/packages.sh:" $unlisted >&2
+  [ -z "$undocumented" ] || printf 'not in docs/dependencies.md: %s\n' "${undocumented//$'\n'/ }" >&2
+  [ -z "$unlisted" ] || printf 'not in tools/lib/packages.sh: %s\n' "${unlisted//$'\n'/ }" >&2
   exit 1
 fi
 echo "$(wc -l <<<"$installed") packages, the same in both."
