@@ -45,12 +45,12 @@ end_all_children() {
 }
 trap end_all_children EXIT
 
-# show_progress LOG: repeats the log's last line from time to time, for steps that take minutes.
+# show_progress LOG [SECONDS]: repeats the log's last line from time to time, for steps that take long.
 show_progress() {
   local nap=
   trap 'kill "$nap" 2>/dev/null; exit 0' TERM
   while :; do
-    sleep 20 >/dev/null 2>&1 &
+    sleep "${2:-20}" >/dev/null 2>&1 &
     nap=$!
     wait "$nap"
     printf '    ... %s\n' "$(tail -n 1 "$1" | cut -c 1-110)"
