@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cassert>
 #include <cstddef>
@@ -8,9 +9,10 @@
 
 namespace posed {
 
-/// A queue between exactly one producer thread and one consumer thread that refuses when full. Elements are filled and read in place,
-/// so large ones (a keyframe with all its features) cross threads without a copy and keep their buffers from use to use. Lock-free;
-/// no allocation after construction. Producer: `claim`, `commit`. Consumer: `front`, `release`. Either: `size`.
+/// A queue between exactly one producer thread and one consumer thread that refuses when full. Elements are filled and read in
+/// place, so large ones (a keyframe with all its features) cross threads without a copy and keep their buffers from use to use.
+/// Lock-free; no allocation after construction. Producer: `claim`, `commit`. Consumer: `front`, `release`. Any thread: `size`,
+/// `capacity`.
 template <typename T>
 class BoundedRing {
  public:
@@ -23,7 +25,10 @@ class BoundedRing {
   }
 
   /// Producer. Hands the claimed cell to the consumer.
-  void commit() noexcept { tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
+  void commit() noexcept {
+    assert(claim() != nullptr && "nothing was claimed");
+    tail_.store(tail_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  }
 
   /// Consumer. The oldest element, or null where there is none. It stays valid until `release`.
   T* front() noexcept {
@@ -32,12 +37,19 @@ class BoundedRing {
   }
 
   /// Consumer. Gives the cell of `front` back to the producer.
-  void release() noexcept { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
-
-  std::size_t size() const noexcept {
-    const std::uint64_t head = head_.load(std::memory_order_acquire);
-    return static_cast<std::size_t>(tail_.load(std::memory_order_acquire) - head);
+  void release() noexcept {
+    assert(front() != nullptr && "nothing to release");
+    head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
   }
+
+  /// Committed elements: a snapshot that either side may change at once.
+  std::size_t size() const noexcept {
+    const std::uint64_t head = head_.load(std::memory_order_acquire);  // first, so that the difference is never negative
+    const std::uint64_t queued = tail_.load(std::memory_order_acquire) - head;
+    return std::min(static_cast<std::size_t>(queued), cells_.size());  // both sides may have moved on in between
+  }
+
+  std::size_t capacity() const noexcept { return cells_.size(); }
 
   /// Before any thread uses the ring: gives every cell its working size.
   template <typename Prepare>

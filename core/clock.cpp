@@ -15,7 +15,9 @@ std::int64_t read_clock(clockid_t id) noexcept {
 
 }  // namespace
 
-TimeNs SystemClock::now_ns() const noexcept { return read_clock(CLOCK_MONOTONIC); }
+TimeNs SystemClock::now_ns() const noexcept {
+  return read_clock(CLOCK_MONOTONIC);
+}
 
 void SystemClock::sleep_until(TimeNs deadline_ns) const {
   const timespec t{deadline_ns / kNsPerSecond, deadline_ns % kNsPerSecond};

@@ -11,9 +11,16 @@ constexpr TimeNs kNsPerUs = 1'000;
 constexpr TimeNs kNsPerMs = 1'000'000;
 constexpr TimeNs kNsPerSecond = 1'000'000'000;
 
-constexpr double to_ms(TimeNs duration_ns) { return static_cast<double>(duration_ns) * 1e-6; }
-constexpr double to_seconds(TimeNs duration_ns) { return static_cast<double>(duration_ns) * 1e-9; }
-constexpr TimeNs from_seconds(double seconds) { return static_cast<TimeNs>(seconds * 1e9); }
+constexpr double to_ms(TimeNs duration_ns) {
+  return static_cast<double>(duration_ns) * 1e-6;
+}
+constexpr double to_seconds(TimeNs duration_ns) {
+  return static_cast<double>(duration_ns) * 1e-9;
+}
+/// To the nearest nanosecond: 0.033 s is 33,000,000 ns although the double is a little below it.
+constexpr TimeNs from_seconds(double seconds) {
+  return static_cast<TimeNs>(seconds * 1e9 + (seconds < 0 ? -0.5 : 0.5));
+}
 
 /// The time, injectable so that tests need not wait for it. Thread-safe.
 class Clock {

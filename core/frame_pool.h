@@ -69,7 +69,7 @@ class FramePool {
   FramePool(const FramePool&) = delete;
   FramePool& operator=(const FramePool&) = delete;
 
-  /// A free slot, its metadata reset and its pixels left as they were; nothing where all slots are held. Never blocks.
+  /// A free slot, its metadata and views reset and its pixels left as they were; nothing where all slots are held. Never blocks.
   std::optional<FrameWriter> acquire() noexcept;
 
   std::size_t slots() const noexcept { return slots_.size(); }
@@ -87,11 +87,15 @@ class FramePool {
     RgbdFrame frame;
   };
 
+  RgbdFrame blank_frame(std::uint32_t slot) const noexcept;
   void hold(std::uint32_t slot) noexcept { slots_[slot].holds.fetch_add(1, std::memory_order_relaxed); }
   void release(std::uint32_t slot) noexcept { slots_[slot].holds.fetch_sub(1, std::memory_order_release); }
 
   int width_;
   int height_;
+  std::size_t depth_row_bytes_;
+  std::size_t bgr_row_bytes_;
+  std::size_t gray_row_bytes_;
   std::vector<Slot> slots_;
   struct FreeAligned {
     void operator()(std::byte* p) const noexcept;
@@ -109,12 +113,16 @@ inline FrameRef::~FrameRef() {
     pool_->release(slot_);
   }
 }
-inline const RgbdFrame& FrameRef::operator*() const noexcept { return pool_->slots_[slot_].frame; }
+inline const RgbdFrame& FrameRef::operator*() const noexcept {
+  return pool_->slots_[slot_].frame;
+}
 inline FrameWriter::~FrameWriter() {
   if (pool_ != nullptr) {
     pool_->release(slot_);
   }
 }
-inline RgbdFrame& FrameWriter::operator*() noexcept { return pool_->slots_[slot_].frame; }
+inline RgbdFrame& FrameWriter::operator*() noexcept {
+  return pool_->slots_[slot_].frame;
+}
 
 }  // namespace posed

@@ -10,21 +10,17 @@ namespace posed {
 template <typename T>
 struct ImageView {
   T* data = nullptr;
-  int width = 0;          ///< pixels a row
-  int height = 0;         ///< rows
+  int width = 0;              ///< pixels a row
+  int height = 0;             ///< rows
   std::ptrdiff_t stride = 0;  ///< elements (not bytes) from one row to the next
-  int channels = 1;       ///< interleaved elements a pixel
+  int channels = 1;           ///< interleaved elements a pixel
 
   T* row(int y) const noexcept { return data + y * stride; }
   T& at(int x, int y) const noexcept { return data[y * stride + x * channels]; }
   bool empty() const noexcept { return data == nullptr; }
   bool contains(int x, int y) const noexcept { return x >= 0 && y >= 0 && x < width && y < height; }
 
-  operator ImageView<const T>() const noexcept
-    requires(!std::is_const_v<T>)
-  {
-    return {data, width, height, stride, channels};
-  }
+  operator ImageView<const T>() const noexcept requires(!std::is_const_v<T>) { return {data, width, height, stride, channels}; }
 };
 
 }  // namespace posed

@@ -13,8 +13,9 @@ namespace posed {
 template <typename T>
 class LatestValue {
  public:
-  /// Producer. The value to fill next; it holds what was published two or three values ago.
-  T& back() noexcept { return values_[back_]; }
+  /// Producer. The value to fill next. It holds some value published earlier, however long ago, or its initial one: overwrite it
+  /// all.
+  T& back() noexcept { return slots_[back_].value; }
 
   /// Producer. Makes `back()` the newest value.
   void publish() noexcept {
@@ -33,13 +34,13 @@ class LatestValue {
   }
 
   /// Consumer. The value of the last `refresh`, default-constructed before the first; unchanged until the next `refresh`.
-  const T& front() const noexcept { return values_[front_]; }
+  const T& front() const noexcept { return slots_[front_].value; }
 
   /// Before any thread uses it: gives all three values their working size.
   template <typename Prepare>
   void prepare(Prepare&& prepare_value) {
-    for (T& value : values_) {
-      prepare_value(value);
+    for (Slot& slot : slots_) {
+      prepare_value(slot.value);
     }
   }
 
@@ -48,7 +49,12 @@ class LatestValue {
   static constexpr std::uint8_t kIndexMask = 3;
   static constexpr std::size_t kCacheLine = 64;
 
-  std::array<T, 3> values_{};
+  // Own cache lines, so that writing one value does not slow the reading of another.
+  struct alignas(kCacheLine) Slot {
+    T value{};
+  };
+
+  std::array<Slot, 3> slots_{};
   alignas(kCacheLine) std::uint8_t back_ = 0;                // producer's own
   alignas(kCacheLine) std::atomic<std::uint8_t> middle_{1};  // index of the value in between, and whether it is unread
   alignas(kCacheLine) std::uint8_t front_ = 2;               // consumer's own

@@ -1,5 +1,8 @@
 #include "core/logging.h"
 
+#include <memory>
+#include <utility>
+
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -8,7 +11,7 @@ namespace posed {
 namespace {
 
 constexpr std::pair<std::string_view, LogLevel> kLevels[] = {
-    {"debug", LogLevel::Debug}, {"info", LogLevel::Info},   {"warning", LogLevel::Warning},
+    {"debug", LogLevel::Debug}, {"info", LogLevel::Info}, {"warning", LogLevel::Warning},
     {"error", LogLevel::Error}, {"off", LogLevel::Off},
 };
 
@@ -44,7 +47,9 @@ Result<LogLevel> parse_log_level(std::string_view name) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("log level '{}': allowed are debug, info, warning, error, off", name));
 }
 
-void set_log_level(LogLevel level) { logger().set_level(to_spdlog(level)); }
+void set_log_level(LogLevel level) {
+  logger().set_level(to_spdlog(level));
+}
 
 void log_message(LogLevel level, std::string_view message) {
   logger().log(to_spdlog(level), "{}", message);

@@ -31,18 +31,19 @@ std::uint64_t LatencyHistogram::upper_bound_ns(std::size_t bucket) noexcept {
 
 void LatencyHistogram::record(TimeNs duration_ns) noexcept {
   const auto ns = static_cast<std::uint64_t>(std::max<TimeNs>(duration_ns, 0));
-  counts_[bucket_of(ns)].fetch_add(1, std::memory_order_relaxed);
   sum_ns_.fetch_add(ns, std::memory_order_relaxed);
   std::uint64_t max = max_ns_.load(std::memory_order_relaxed);
   while (ns > max && !max_ns_.compare_exchange_weak(max, ns, std::memory_order_relaxed)) {
   }
+  // Last and with release: a summary that counts this value also sees a maximum that covers it.
+  counts_[bucket_of(ns)].fetch_add(1, std::memory_order_release);
 }
 
 LatencySummary LatencyHistogram::summary() const noexcept {
   std::array<std::uint64_t, kBuckets> counts;
   std::uint64_t total = 0;
   for (std::size_t i = 0; i < kBuckets; ++i) {
-    counts[i] = counts_[i].load(std::memory_order_relaxed);
+    counts[i] = counts_[i].load(std::memory_order_acquire);
     total += counts[i];
   }
   LatencySummary summary;
@@ -54,13 +55,13 @@ LatencySummary LatencyHistogram::summary() const noexcept {
   const auto quantile_ms = [&](double q) {
     const auto rank = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(total))));
     std::uint64_t seen = 0;
-    for (std::size_t i = 0; i < kBuckets; ++i) {
+    for (std::size_t i = 0; i + 1 < kBuckets; ++i) {
       seen += counts[i];
       if (seen >= rank) {
         return static_cast<double>(std::min(upper_bound_ns(i), max_ns)) * 1e-6;
       }
     }
-    return static_cast<double>(max_ns) * 1e-6;
+    return static_cast<double>(max_ns) * 1e-6;  // in the last bucket, which has no upper bound
   };
   summary.mean_ms = static_cast<double>(sum_ns_.load(std::memory_order_relaxed)) / static_cast<double>(total) * 1e-6;
   summary.p50_ms = quantile_ms(0.50);

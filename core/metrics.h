@@ -30,9 +30,11 @@ struct LatencySummary {
   double max_ms = 0;
 };
 
-/// Durations from 1 ns to over an hour in logarithmic buckets, each octave split in 32: a quantile is at most 3.2 % too high and
-/// never too low, and the maximum is exact. `record` is wait-free but for the maximum (lock-free) and does not allocate.
-/// Thread-safe; a summary taken during recording may miss the newest values.
+/// Durations in logarithmic buckets, each octave split in 32: a quantile (the smallest recorded value that is not below its share
+/// of all) is at most 1/32 = 3.2 % too high and never too low, and the maximum is exact. Durations of 2^42 ns (73 minutes) and more
+/// share the last bucket; a quantile that falls there is the maximum. Negative durations count as 0. `record` is wait-free but for
+/// the maximum (lock-free) and does not allocate. Thread-safe; a summary taken during recording or reset may miss the newest
+/// values, and its mean may then be off by them.
 class LatencyHistogram {
  public:
   void record(TimeNs duration_ns) noexcept;
@@ -41,8 +43,8 @@ class LatencyHistogram {
 
  private:
   static constexpr int kSubBucketBits = 5;
-  static constexpr int kOctaves = 42;  // 2^42 ns = 73 min
-  static constexpr std::size_t kBuckets = static_cast<std::size_t>(kOctaves) << kSubBucketBits;
+  static constexpr int kRangeBits = 42;  // 2^42 ns = 73 min
+  static constexpr std::size_t kBuckets = static_cast<std::size_t>(kRangeBits - kSubBucketBits + 1) << kSubBucketBits;
 
   static std::size_t bucket_of(std::uint64_t ns) noexcept;
   static std::uint64_t upper_bound_ns(std::size_t bucket) noexcept;

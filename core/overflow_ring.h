@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cassert>
 #include <cstddef>
@@ -52,8 +53,11 @@ class IndexRing {
 
   std::size_t size() const noexcept {
     const std::uint64_t head = head_.load(std::memory_order_acquire);  // first, so that the difference is never negative
-    return static_cast<std::size_t>(tail_.load(std::memory_order_acquire) - head);
+    const std::uint64_t queued = tail_.load(std::memory_order_acquire) - head;
+    return std::min(static_cast<std::size_t>(queued), capacity_);  // both sides may have moved on in between
   }
+
+  std::size_t capacity() const noexcept { return capacity_; }
 
  private:
   std::size_t capacity_;
@@ -66,10 +70,12 @@ class IndexRing {
 
 /// A queue between exactly one producer thread and one consumer thread that never blocks and never refuses: when it is full, `push`
 /// hands the oldest element back to the producer, who drops and counts it. Lock-free; no allocation after construction.
-/// `push` belongs to the producer thread, `pop` to the consumer thread, `size` to either (a snapshot that the other side may change).
+/// `push` belongs to the producer thread, `pop` to the consumer thread; any thread may call `size` (a snapshot that either side may
+/// change at once) and `capacity`. Moving a T must not throw.
 ///
-/// Elements lie in capacity + 2 cells; what crosses threads is the number of a cell. One cell can be in the consumer's hands and one
-/// in the producer's while `capacity` are queued, so the producer always finds a free one.
+/// Elements lie in capacity + 2 cells; what crosses threads is the number of a cell. One cell can be in the consumer's hands and
+/// one in the producer's while `capacity` are queued, so the producer always finds a free one: who sees the consumer's k-th pop in
+/// `queued_` also sees the k - 1 cells it freed before.
 template <typename T>
 class OverflowRing {
  public:
@@ -105,6 +111,7 @@ class OverflowRing {
   }
 
   std::size_t size() const noexcept { return queued_.size(); }
+  std::size_t capacity() const noexcept { return queued_.capacity(); }
 
  private:
   std::uint32_t take_free_cell() noexcept {

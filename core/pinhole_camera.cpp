@@ -32,8 +32,7 @@ Distorted distort_normalised(const CameraIntrinsics& k, const Eigen::Vector2d& n
 }  // namespace
 
 PinholeCamera::PinholeCamera(const CameraIntrinsics& intrinsics)
-    : k_(intrinsics),
-      distorted_(k_.k1 != 0 || k_.k2 != 0 || k_.p1 != 0 || k_.p2 != 0 || k_.k3 != 0) {}
+    : k_(intrinsics), distorted_(k_.k1 != 0 || k_.k2 != 0 || k_.p1 != 0 || k_.p2 != 0 || k_.k3 != 0) {}
 
 Eigen::Vector2d PinholeCamera::distort(const Eigen::Vector2d& ideal_pixel) const {
   if (!distorted_) {

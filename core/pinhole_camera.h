@@ -6,14 +6,14 @@ namespace posed {
 
 /// Intrinsics of an RGB-D camera whose depth is registered to colour.
 struct CameraIntrinsics {
-  int width = 640;          ///< pixels
-  int height = 480;         ///< pixels
-  double fx = 525.0;        ///< focal lengths [pixels]
+  int width = 640;    ///< pixels
+  int height = 480;   ///< pixels
+  double fx = 525.0;  ///< focal lengths [pixels]
   double fy = 525.0;
-  double cx = 319.5;        ///< principal point [pixels]; pixel centres have whole-numbered coordinates
+  double cx = 319.5;  ///< principal point [pixels]; pixel centres have whole-numbered coordinates
   double cy = 239.5;
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;  ///< radial-tangential distortion (Brown-Conrady, as in OpenCV)
-  double depth_units_per_metre = 5000.0;  ///< raw 16-bit depth / this = metres
+  double depth_units_per_metre = 5000.0;          ///< raw 16-bit depth / this = metres
   double baseline_fx = 40.0;  ///< [pixel metres] baseline times fx: the virtual stereo coordinate is u_r = u - baseline_fx / z
 };
 
@@ -38,7 +38,8 @@ class PinholeCamera {
   /// Ideal pixel to the pixel where the lens puts it.
   Eigen::Vector2d distort(const Eigen::Vector2d& ideal_pixel) const;
 
-  /// Pixel as seen to the ideal pixel: inverse of `distort` to 1e-6 pixels within the image, by Newton's method.
+  /// Pixel as seen to the ideal pixel: inverse of `distort` to 1e-6 pixels within the image, by Newton's method, for a
+  /// calibration that is one-to-one there (a polynomial fitted well beyond its data may fold back; then the result means nothing).
   Eigen::Vector2d undistort(const Eigen::Vector2d& seen_pixel) const;
 
   /// Smallest axis-aligned box of ideal pixels that holds the whole undistorted image: (min x, min y, max x, max y).

@@ -12,8 +12,8 @@ namespace posed {
 /// One RGB-D frame, depth registered to colour. The pixels belong to a slot of a `FramePool`; once the frame is shared nobody
 /// writes to it, so any thread may read it.
 struct RgbdFrame {
-  std::uint64_t sequence = 0;  ///< counts the source's frames from 0; a gap is a frame lost before the pool
-  TimeNs capture_ns = 0;       ///< monotonic time of capture; in paced replay, the instant the frame was due
+  std::uint64_t sequence = 0;     ///< counts the source's frames from 0; a gap is a frame lost before the pool
+  TimeNs capture_ns = 0;          ///< monotonic time of capture; in paced replay, the instant the frame was due
   std::int64_t stamp_utc_ns = 0;  ///< capture time since 1970 UTC; for a recording, the colour image's stamp in its list
 
   ImageView<std::uint8_t> bgr;   ///< 3 channels, 8 bit

@@ -6,23 +6,26 @@ namespace posed {
 
 namespace {
 
-/// Left Jacobian of SO(3): V in exp((phi, rho)) = (Exp(phi), V(phi) * rho). Series below 1e-4 rad, where the closed form cancels.
+/// Left Jacobian of SO(3): V in exp((phi, rho)) = (Exp(phi), V(phi) * rho). Series below 1e-4 rad, where the closed form cancels;
+/// 1 - cos(theta) is written as 2 sin^2(theta / 2), which does not cancel at all.
 Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& phi) {
   const double theta2 = phi.squaredNorm();
   const double theta = std::sqrt(theta2);
   const Eigen::Matrix3d hat = skew(phi);
   const bool small = theta < 1e-4;
-  const double b = small ? 0.5 - theta2 / 24.0 : (1.0 - std::cos(theta)) / theta2;
+  const double sin_half = std::sin(0.5 * theta);
+  const double b = small ? 0.5 - theta2 / 24.0 : 2.0 * sin_half * sin_half / theta2;
   const double c = small ? 1.0 / 6.0 - theta2 / 120.0 : (theta - std::sin(theta)) / (theta2 * theta);
   return Eigen::Matrix3d::Identity() + b * hat + c * hat * hat;
 }
 
+/// Written with cot(theta / 2), which stays exact up to pi, where (1 + cos(theta)) / sin(theta) becomes 0 / 0.
 Eigen::Matrix3d inverse_left_jacobian(const Eigen::Vector3d& phi) {
   const double theta2 = phi.squaredNorm();
   const double theta = std::sqrt(theta2);
   const Eigen::Matrix3d hat = skew(phi);
-  const double c = theta < 1e-4 ? 1.0 / 12.0 + theta2 / 720.0
-                                : 1.0 / theta2 - (1.0 + std::cos(theta)) / (2.0 * theta * std::sin(theta));
+  const double half = 0.5 * theta;
+  const double c = theta < 1e-4 ? 1.0 / 12.0 + theta2 / 720.0 : (1.0 - half * std::cos(half) / std::sin(half)) / theta2;
   return Eigen::Matrix3d::Identity() - 0.5 * hat + c * hat * hat;
 }
 

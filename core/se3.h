@@ -38,9 +38,7 @@ class Se3 {
     const Eigen::Quaterniond r = rotation_.conjugate();
     return Se3(r, r * -translation_);
   }
-  Se3 operator*(const Se3& other) const {
-    return Se3(rotation_ * other.rotation_, rotation_ * other.translation_ + translation_);
-  }
+  Se3 operator*(const Se3& other) const { return Se3(rotation_ * other.rotation_, rotation_ * other.translation_ + translation_); }
   Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return rotation_ * p + translation_; }
 
   /// Ad such that T * exp(xi) == exp(Ad * xi) * T: it moves a tangent (and Ad * C * Ad^T a covariance) to the left side.

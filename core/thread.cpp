@@ -1,11 +1,11 @@
 #include "core/thread.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
-#include <system_error>
-
 #include <pthread.h>
 #include <sched.h>
+#include <system_error>
 
 #include <fmt/ranges.h>
 
@@ -25,35 +25,62 @@ void adopt_name(const std::string& name) {
   pthread_setname_np(pthread_self(), thread_name);
 }
 
-std::string describe(int error) { return std::generic_category().message(error); }
+std::string describe(int error) {
+  return std::generic_category().message(error);
+}
+
+/// 0 or an errno.
+int apply_policy(const ThreadOptions& options) {
+  sched_param parameters{};
+  if (options.policy == SchedulingPolicy::Fifo) {
+    parameters.sched_priority = options.priority;
+    return pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+  }
+  // A thread inherits its creator's policy: a helper that a real-time thread starts must not run as urgently unasked.
+  int inherited = SCHED_OTHER;
+  if (const int error = pthread_getschedparam(pthread_self(), &inherited, &parameters); error != 0) {
+    return error;
+  }
+  if (inherited != SCHED_FIFO && inherited != SCHED_RR) {
+    return 0;
+  }
+  parameters.sched_priority = 0;
+  return pthread_setschedparam(pthread_self(), SCHED_OTHER, &parameters);
+}
+
+/// 0 or an errno.
+int apply_affinity(const std::vector<int>& cpus) {
+  if (cpus.empty()) {
+    return 0;
+  }
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  for (const int cpu : cpus) {
+    if (cpu < 0 || cpu >= CPU_SETSIZE) {
+      return EINVAL;
+    }
+    CPU_SET(static_cast<std::size_t>(cpu), &set);
+  }
+  return pthread_setaffinity_np(pthread_self(), sizeof(set), &set);
+}
 
 }  // namespace
 
 Status apply_thread_options(const ThreadOptions& options) {
-  std::string refused;
-  if (options.policy == SchedulingPolicy::Fifo) {
-    sched_param parameters{};
-    parameters.sched_priority = options.priority;
-    if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters); error != 0) {
-      refused = fmt::format("SCHED_FIFO priority {} ({})", options.priority, describe(error));
-    }
+  std::vector<std::string> refused;
+  if (const int error = apply_policy(options); error != 0) {
+    refused.push_back(options.policy == SchedulingPolicy::Fifo
+                          ? fmt::format("SCHED_FIFO priority {} ({})", options.priority, describe(error))
+                          : fmt::format("SCHED_OTHER ({})", describe(error)));
   }
-  if (!options.cpus.empty()) {
-    cpu_set_t set;
-    CPU_ZERO(&set);
-    for (const int cpu : options.cpus) {
-      if (cpu >= 0 && cpu < CPU_SETSIZE) {
-        CPU_SET(static_cast<std::size_t>(cpu), &set);
-      }
-    }
-    if (const int error = pthread_setaffinity_np(pthread_self(), sizeof(set), &set); error != 0) {
-      refused += fmt::format("{}processors {} ({})", refused.empty() ? "" : ", ", fmt::join(options.cpus, ","), describe(error));
-    }
+  if (const int error = apply_affinity(options.cpus); error != 0) {
+    refused.push_back(fmt::format("processors {} ({})", fmt::join(options.cpus, ","), describe(error)));
   }
   if (refused.empty()) {
     return {};
   }
-  return make_error(ErrorCode::Unavailable, fmt::format("thread {}: refused by the system: {}", options.name, refused));
+  return make_error(ErrorCode::Unavailable,
+                    fmt::format("thread {}: refused by the system: {}", options.name, fmt::join(refused, ", ")));
 }
 
 NamedThread::NamedThread(ThreadOptions options, Body body)
@@ -65,6 +92,8 @@ NamedThread::NamedThread(ThreadOptions options, Body body)
         body(std::move(stop));
       }) {}
 
-const char* current_thread_name() noexcept { return thread_name; }
+const char* current_thread_name() noexcept {
+  return thread_name;
+}
 
 }  // namespace posed

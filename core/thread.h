@@ -10,18 +10,22 @@
 
 namespace posed {
 
-enum class SchedulingPolicy { Normal, Fifo };
+enum class SchedulingPolicy {
+  Normal,  ///< the system's time sharing, also where the starting thread is a real-time one
+  Fifo,    ///< SCHED_FIFO
+};
 
 /// How a thread is to run. What the system refuses degrades with one warning in the log, never with an error.
 struct ThreadOptions {
   std::string name;  ///< shown by ps and top; the kernel keeps 15 characters
   SchedulingPolicy policy = SchedulingPolicy::Normal;
   int priority = 0;       ///< 1 to 99 for Fifo; ignored for Normal
-  std::vector<int> cpus;  ///< empty: any
+  std::vector<int> cpus;  ///< empty: those of the thread that starts it
 };
 
 /// A thread with a name, a policy and a stop token that joins when it is destroyed (after asking it to stop). Thread-bound: the
-/// object belongs to the thread that made it.
+/// object belongs to the thread that made it. The body must not throw. A system without room for one more thread is treated like
+/// one without memory: std::system_error, which nobody is expected to catch.
 class NamedThread {
  public:
   using Body = std::function<void(std::stop_token)>;

@@ -1,11 +1,13 @@
 #include "core/wake_event.h"
 
+#include <algorithm>
 #include <climits>
 #include <ctime>
+#include <limits>
+#include <unistd.h>
 
 #include <linux/futex.h>
 #include <sys/syscall.h>
-#include <unistd.h>
 
 namespace posed {
 
@@ -29,10 +31,12 @@ void WakeEvent::notify() noexcept {
 }
 
 bool WakeEvent::wait(std::uint32_t seen, TimeNs timeout_ns) noexcept {
-  const TimeNs deadline_ns = SystemClock::instance().now_ns() + timeout_ns;
+  const TimeNs start_ns = SystemClock::instance().now_ns();
+  const TimeNs deadline_ns = start_ns + std::min(timeout_ns, std::numeric_limits<TimeNs>::max() - start_ns);
   waiters_.fetch_add(1, std::memory_order_seq_cst);
   bool moved_on = generation_.load(std::memory_order_seq_cst) != seen;
-  for (TimeNs left_ns = timeout_ns; !moved_on && left_ns > 0; left_ns = deadline_ns - SystemClock::instance().now_ns()) {
+  for (TimeNs left_ns = deadline_ns - start_ns; !moved_on && left_ns > 0;
+       left_ns = deadline_ns - SystemClock::instance().now_ns()) {
     const timespec timeout{left_ns / kNsPerSecond, left_ns % kNsPerSecond};
     futex(generation_, FUTEX_WAIT, seen, &timeout);
     moved_on = generation_.load(std::memory_order_seq_cst) != seen;

@@ -17,7 +17,8 @@ class WakeEvent {
   /// Wakes all that wait. Does not block and does not allocate.
   void notify() noexcept;
 
-  /// Sleeps until `generation() != seen` or the time-out has passed; true where it moved on.
+  /// Sleeps until `generation() != seen` or the time-out has passed (at once where it is 0 or less; for ever with the largest
+  /// value); true where it moved on.
   bool wait(std::uint32_t seen, TimeNs timeout_ns) noexcept;
 
  private:

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -22,6 +23,14 @@ struct Keypoint {
 struct Features {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;
+
+  void reserve(std::size_t capacity) {
+    keypoints.reserve(capacity);
+    descriptors.reserve(capacity);
+  }
 };
+
+/// Room to reserve for the features of a frame, so that no vector grows while tracking: the extractor may give a few more than asked for.
+constexpr std::size_t feature_capacity(int nominal_features) { return 2 * static_cast<std::size_t>(nominal_features); }
 
 }  // namespace posed

@@ -31,6 +31,14 @@ struct KeyframeRecord {
   std::vector<Eigen::Vector2f> ideal_pixels;  ///< undistorted keypoints
   std::vector<float> depth_m;                 ///< 0 where the sensor saw none
   std::vector<LandmarkId> landmarks;          ///< matched landmark, or kNoLandmark
+
+  /// Makes room for `capacity` keypoints, so that filling the record does not allocate.
+  void reserve(std::size_t capacity) {
+    features.reserve(capacity);
+    ideal_pixels.reserve(capacity);
+    depth_m.reserve(capacity);
+    landmarks.reserve(capacity);
+  }
 };
 
 }  // namespace posed

@@ -16,8 +16,8 @@ struct SnapshotLandmark {
   LandmarkId id = kNoLandmark;
   Eigen::Vector3f p_map = Eigen::Vector3f::Zero();        ///< [m]
   Eigen::Vector3f mean_view_map = Eigen::Vector3f::Zero();  ///< unit vector from the observing cameras to the landmark, averaged
-  float min_distance_m = 0;  ///< from where the pyramid's first level would see it at its own scale
-  float max_distance_m = 0;  ///< likewise the last level
+  float max_distance_m = 0;  ///< from here the pyramid's first level (0) shows it at the scale it was described at
+  float min_distance_m = 0;  ///< from here the last level does
   Descriptor descriptor{};
 };
 

@@ -15,7 +15,8 @@ namespace posed {
 /// same snapshots give the same bits. Thread-bound: one thread calls `track`.
 class Tracker {
  public:
-  Tracker(const TrackerConfig& config, const CameraIntrinsics& camera, const Se3& T_map_camera_start);
+  /// `T_map_camera_start`: the camera's pose in the map frame when a map begins.
+  Tracker(const TrackerConfig& config, const MapperConfig& mapper, const CameraIntrinsics& camera, const Se3& T_map_camera_start);
   ~Tracker();
 
   /// The pose of `frame`. Where the frame should become a keyframe and `candidate` is not null, fills `*candidate` and says so in

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "slam/hamming.h"
+
+namespace posed::kernels {
+
+extern const HammingKernels kHammingBaseline;
+#ifdef POSED_KERNELS_X86
+extern const HammingKernels kHammingAvx2;
+extern const HammingKernels kHammingAvx512;
+#endif
+
+}  // namespace posed::kernels

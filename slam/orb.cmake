@@ -1,0 +1,26 @@
+# Sources of the ORB extractor and the Hamming distances. The kernels are compiled once for each instruction set (slam/kernels/simd.h);
+# slam/CMakeLists.txt links POSED_ORB_KERNEL_OBJECTS into posed_slam.
+set(POSED_ORB_SOURCES hamming.cpp simd_level.cpp)
+set(POSED_ORB_KERNEL_SOURCES kernels/hamming_kernels.cpp)
+
+# posed_kernels(LEVEL FLAGS ...): the kernel sources for one instruction set. They are hot, so also development builds optimise them.
+function(posed_kernels level)
+  add_library(posed_kernels_${level} OBJECT ${POSED_ORB_KERNEL_SOURCES})
+  target_link_libraries(posed_kernels_${level} PRIVATE posed_options Eigen3::Eigen)
+  target_include_directories(posed_kernels_${level} SYSTEM PRIVATE "${OPENCV_INCLUDE_DIR}")
+  target_compile_options(posed_kernels_${level} PRIVATE -O3 ${ARGN})
+endfunction()
+
+posed_kernels(baseline)
+set(POSED_ORB_KERNEL_OBJECTS $<TARGET_OBJECTS:posed_kernels_baseline>)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+  set(POSED_ORB_DEFINITIONS POSED_KERNELS_X86=1)
+  posed_kernels(avx2 -mavx2 -mbmi -mpopcnt)
+  posed_kernels(avx512 -mavx2 -mbmi -mpopcnt -mavx512f -mavx512bw -mavx512cd -mavx512dq -mavx512vl)
+  foreach(level avx2 avx512)
+    list(APPEND POSED_ORB_KERNEL_OBJECTS $<TARGET_OBJECTS:posed_kernels_${level}>)
+  endforeach()
+  foreach(level baseline avx2 avx512)
+    target_compile_definitions(posed_kernels_${level} PRIVATE ${POSED_ORB_DEFINITIONS})
+  endforeach()
+endif()

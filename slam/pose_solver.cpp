@@ -1,0 +1,200 @@
+#include "slam/pose_solver.h"
+
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+namespace posed {
+
+namespace {
+
+// 95 % quantiles of the chi-squared distribution with 2 and 3 degrees of freedom.
+constexpr double kChi2TwoDof = 5.991;
+constexpr double kChi2ThreeDof = 7.815;
+constexpr double kMinDepth = 1e-3;  // [m] nearer, or behind: the projection says nothing
+
+struct Residual {
+  Eigen::Vector3d p_camera;
+  Eigen::Vector3d error;   // measured minus predicted: u, v, disparity
+  Eigen::Vector3d weight;  // zero for the disparity where there is none
+  double chi2 = std::numeric_limits<double>::infinity();
+};
+
+struct NormalEquations {
+  Matrix6d hessian = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();  // of the step that lowers the cost: J^T W e
+  double cost = 0;
+};
+
+double chi2_bound(const PoseObservation& o) { return o.disparity > 0 ? kChi2ThreeDof : kChi2TwoDof; }
+
+/// World-to-camera in the form that the inner loop wants.
+struct Projection {
+  Eigen::Matrix3d R_camera_map;
+  Eigen::Vector3d t_camera_map;
+  const CameraIntrinsics& k;
+
+  Projection(const Se3& T_map_camera, const CameraIntrinsics& intrinsics)
+      : R_camera_map(T_map_camera.rotation_matrix().transpose()),
+        t_camera_map(-(R_camera_map * T_map_camera.translation())),
+        k(intrinsics) {}
+
+  Residual residual(const PoseObservation& o) const {
+    Residual r;
+    r.p_camera = R_camera_map * o.p_map + t_camera_map;
+    if (r.p_camera.z() < kMinDepth) {
+      return r;
+    }
+    const double inverse_z = 1.0 / r.p_camera.z();
+    r.error.x() = o.ideal_pixel.x() - (k.fx * r.p_camera.x() * inverse_z + k.cx);
+    r.error.y() = o.ideal_pixel.y() - (k.fy * r.p_camera.y() * inverse_z + k.cy);
+    const bool has_depth = o.disparity > 0;
+    r.error.z() = has_depth ? o.disparity - k.baseline_fx * inverse_z : 0.0;
+    r.weight << o.pixel_weight, o.pixel_weight, has_depth ? o.disparity_weight : 0.0;
+    r.chi2 = (r.weight.array() * r.error.array().square()).sum();
+    return r;
+  }
+};
+
+/// Adds one observation. With p' = exp(-xi) p_camera: dp/dphi = skew(p), dp/drho = -I, so J = P * [S, -I] with P the projection's
+/// derivative, and all that is needed of P is A = P^T W P and g = P^T W e.
+void accumulate(const Residual& r, const CameraIntrinsics& k, double robust_weight, NormalEquations& n) {
+  const double inverse_z = 1.0 / r.p_camera.z();
+  const double inverse_z2 = inverse_z * inverse_z;
+  const double px = k.fx * inverse_z;
+  const double pxz = -k.fx * r.p_camera.x() * inverse_z2;
+  const double py = k.fy * inverse_z;
+  const double pyz = -k.fy * r.p_camera.y() * inverse_z2;
+  const double pd = -k.baseline_fx * inverse_z2;
+  const Eigen::Vector3d w = robust_weight * r.weight;
+
+  Eigen::Matrix3d a;
+  a(0, 0) = w.x() * px * px;
+  a(1, 1) = w.y() * py * py;
+  a(0, 1) = a(1, 0) = 0.0;
+  a(0, 2) = a(2, 0) = w.x() * px * pxz;
+  a(1, 2) = a(2, 1) = w.y() * py * pyz;
+  a(2, 2) = w.x() * pxz * pxz + w.y() * pyz * pyz + w.z() * pd * pd;
+  const Eigen::Vector3d g(w.x() * px * r.error.x(), w.y() * py * r.error.y(),
+                          w.x() * pxz * r.error.x() + w.y() * pyz * r.error.y() + w.z() * pd * r.error.z());
+
+  const Eigen::Matrix3d s = skew(r.p_camera);
+  const Eigen::Matrix3d as = a * s;
+  n.hessian.topLeftCorner<3, 3>().noalias() += s.transpose() * as;
+  n.hessian.bottomLeftCorner<3, 3>() -= as;
+  n.hessian.bottomRightCorner<3, 3>() += a;
+  n.gradient.head<3>() += g.cross(r.p_camera);  // S^T g
+  n.gradient.tail<3>() -= g;
+}
+
+/// Normal equations and robust cost (Huber's, with the square root of the chi-squared bound as its corner) over the inliers.
+NormalEquations linearise(const PinholeCamera& camera, const Se3& T_map_camera, std::span<const PoseObservation> observations,
+                          bool robust) {
+  const Projection projection(T_map_camera, camera.intrinsics());
+  NormalEquations n;
+  for (const PoseObservation& o : observations) {
+    if (!o.inlier) {
+      continue;
+    }
+    const Residual r = projection.residual(o);
+    const double bound = chi2_bound(o);
+    if (!std::isfinite(r.chi2)) {
+      n.cost += 4.0 * bound;  // a point behind the camera: a fixed penalty, so that a step that causes it does not look like progress
+      continue;
+    }
+    const bool linear_part = robust && r.chi2 > bound;
+    n.cost += linear_part ? 2.0 * std::sqrt(bound * r.chi2) - bound : r.chi2;
+    accumulate(r, camera.intrinsics(), linear_part ? std::sqrt(bound / r.chi2) : 1.0, n);
+  }
+  n.hessian.triangularView<Eigen::StrictlyUpper>() = n.hessian.transpose();
+  return n;
+}
+
+/// Levenberg-Marquardt until the step is negligible; returns the equations at the solution.
+NormalEquations minimise(const PinholeCamera& camera, Se3& T_map_camera, std::span<const PoseObservation> observations, bool robust,
+                         int max_iterations) {
+  constexpr double kNegligibleStep2 = 1e-14;  // a tenth of a micrometre or microradian
+  double damping = 1e-6;
+  NormalEquations n = linearise(camera, T_map_camera, observations, robust);
+  for (int i = 0; i < max_iterations; ++i) {
+    Matrix6d damped = n.hessian;
+    damped.diagonal() *= 1.0 + damping;
+    const Vector6d step = damped.ldlt().solve(n.gradient);
+    if (!step.allFinite()) {
+      break;
+    }
+    const Se3 candidate = T_map_camera * Se3::exp(step);
+    const NormalEquations at_candidate = linearise(camera, candidate, observations, robust);
+    if (at_candidate.cost > n.cost) {
+      damping = std::max(damping, 1e-4) * 10.0;
+      continue;
+    }
+    T_map_camera = candidate;
+    n = at_candidate;
+    damping *= 0.1;
+    if (step.squaredNorm() < kNegligibleStep2) {
+      break;
+    }
+  }
+  return n;
+}
+
+/// Marks every observation anew; the sum of the inliers' chi-squared and their degrees of freedom.
+struct Classification {
+  int inliers = 0;
+  int changed = 0;
+  double chi2 = 0;
+  int residuals = 0;
+};
+
+Classification classify(const PinholeCamera& camera, const Se3& T_map_camera, std::span<PoseObservation> observations) {
+  const Projection projection(T_map_camera, camera.intrinsics());
+  Classification c;
+  for (PoseObservation& o : observations) {
+    const double chi2 = projection.residual(o).chi2;
+    const bool inlier = chi2 <= chi2_bound(o);
+    c.changed += inlier != o.inlier ? 1 : 0;
+    o.inlier = inlier;
+    if (inlier) {
+      ++c.inliers;
+      c.chi2 += chi2;
+      c.residuals += o.disparity > 0 ? 3 : 2;
+    }
+  }
+  return c;
+}
+
+}  // namespace
+
+PoseSolution solve_pose(const PinholeCamera& camera, const Se3& initial_T_map_camera, std::span<PoseObservation> observations,
+                        const PoseSolverOptions& options) {
+  PoseSolution solution;
+  solution.T_map_camera = initial_T_map_camera;
+  NormalEquations n;
+  Classification c;
+  for (int round = 0; round < options.max_rounds; ++round) {
+    const bool robust = round + 1 < options.max_rounds;
+    n = minimise(camera, solution.T_map_camera, observations, robust, options.max_iterations);
+    c = classify(camera, solution.T_map_camera, observations);
+    if (c.inliers < options.min_inliers) {
+      return solution;
+    }
+    if (!robust || (c.changed == 0 && round > 0)) {
+      break;
+    }
+  }
+  // The covariance belongs to the final set of inliers, without the kernel's weights.
+  n = linearise(camera, solution.T_map_camera, observations, false);
+  const Eigen::LDLT<Matrix6d> factor(n.hessian);
+  if (factor.info() != Eigen::Success || !factor.isPositive() || factor.rcond() < 1e-12) {
+    return solution;
+  }
+  solution.variance_factor = c.chi2 / std::max(1, c.residuals - 6);
+  solution.covariance = solution.variance_factor * factor.solve(Matrix6d::Identity());
+  solution.inliers = c.inliers;
+  solution.solved = solution.T_map_camera.is_finite() && solution.covariance.allFinite();
+  return solution;
+}
+
+}  // namespace posed
