@@ -105,7 +105,7 @@ need_packages() {
     say "Packages: all $# are installed"
     return
   fi
-  say "Packages: $(($# - ${#missing[@]})) of $# are installed; installing, with what they need:"
+  say "Packages: $(($# - ${#missing[@]})) of $# are installed, missing are:"
   printf '%s\n' "${missing[@]}" | sed 's/|/\t/' | awk -F '\t' '{ printf "      %-26s %s\n", $1, $2 }'
   local names=("${missing[@]%%|*}")
   find_root || fail "installing packages needs root's rights: run as root, or as a user with sudo" \

@@ -7,6 +7,8 @@ import xml.etree.ElementTree as ElementTree
 
 def skip_reason(case: ElementTree.Element) -> str:
     """What the test itself said: GoogleTest prints "FILE:LINE: Skipped", then the message, then "[  SKIPPED ]"."""
+    if case.get("status") == "disabled":
+        return "disabled"
     output = case.findtext("system-out") or ""
     said = re.search(r": Skipped\n(.*?)\n*\[  SKIPPED \]", output, re.DOTALL)
     if said and said.group(1).strip():
