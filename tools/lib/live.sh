@@ -9,8 +9,10 @@ url=$(sed -n 's/^url = "\(.*\)"$/\1/p' "$config")
 
 start_child "$bin/tools/posectl/posectl" watch --url "$url" --csv "$folder/received.csv" >"$folder/watch.log" 2>&1
 watch=$child
-sleep 1 # until it has joined the multicast group
-kill -0 "$watch" 2>/dev/null || { cat "$folder/watch.log" >&2; exit 1; }
+for _ in {1..50}; do # until it has subscribed
+  ! grep -q '^watching' "$folder/watch.log" || break
+  sleep 0.1
+done
 
 start_child show_progress "$folder/watch.log" 5
 status=0
