@@ -39,28 +39,29 @@ struct SourceConfig {
 };
 
 struct CameraConfig {
-  std::string calibration = "synthetic.toml";  ///< file; a relative name is looked for beside the configuration, then among the shipped ones
-  Se3 T_base_camera;                           ///< camera (optical) frame to the robot's base frame
-  Se3 T_map_start;                             ///< where base is in map at start, so that the map can be level
+  std::string calibration =
+      "synthetic.toml";  ///< file; a relative name is looked for beside the configuration, then among the shipped ones
+  Se3 T_base_camera;     ///< camera (optical) frame to the robot's base frame
+  Se3 T_map_start;       ///< where base is in map at start, so that the map can be level
 };
 
 struct TrackerConfig {
   int features = 1000;  ///< keypoints a frame
   int pyramid_levels = 8;
   double pyramid_scale = 1.2;
-  int fast_threshold = 20;          ///< grey levels
-  int fast_threshold_minimum = 7;   ///< where a cell has no corner at the first threshold
-  double close_depth_m = 3.0;       ///< depth up to which a keyframe turns keypoints into landmarks at once
-  int min_inliers = 30;             ///< fewer: the pose is not trusted, the state becomes lost
-  int keyframe_max_interval = 30;   ///< frames
+  int fast_threshold = 20;              ///< grey levels
+  int fast_threshold_minimum = 7;       ///< where a cell has no corner at the first threshold
+  double close_depth_m = 3.0;           ///< depth up to which a keyframe turns keypoints into landmarks at once
+  int min_inliers = 30;                 ///< fewer: the pose is not trusted, the state becomes lost
+  int keyframe_max_interval = 30;       ///< frames
   double keyframe_inlier_ratio = 0.75;  ///< of the reference keyframe's landmarks; fewer seen asks for a keyframe
 };
 
 struct MapperConfig {
-  int max_keyframes = 200;            ///< kept in the map
-  int local_landmarks = 4000;         ///< in the snapshot the tracker sees
-  int local_keyframes = 12;           ///< whose landmarks make the local map
-  int recovery_keyframes = 20;        ///< recent ones to match against when lost
+  int max_keyframes = 200;      ///< kept in the map
+  int local_landmarks = 4000;   ///< in the snapshot the tracker sees
+  int local_keyframes = 12;     ///< whose landmarks make the local map
+  int recovery_keyframes = 20;  ///< recent ones to match against when lost
 };
 
 struct PublisherConfig {
@@ -81,9 +82,9 @@ struct ThreadConfig {
 
 struct PipelineConfig {
   int frame_slots = 16;
-  int frame_queue = 2;      ///< frames waiting for the tracker before the oldest is dropped
-  int keyframe_queue = 4;   ///< keyframes waiting for the mapper before none is made
-  int publish_queue = 64;   ///< poses waiting for the publisher before the oldest is dropped
+  int frame_queue = 2;     ///< frames waiting for the tracker before the oldest is dropped
+  int keyframe_queue = 4;  ///< keyframes waiting for the mapper before none is made
+  int publish_queue = 64;  ///< poses waiting for the publisher before the oldest is dropped
   ThreadConfig capture;
   ThreadConfig tracker;
   ThreadConfig mapper;

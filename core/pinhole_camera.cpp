@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include <Eigen/LU>
+
 namespace posed {
 
 namespace {

@@ -19,8 +19,8 @@ enum class SchedulingPolicy {
 struct ThreadOptions {
   std::string name;  ///< shown by ps and top; the kernel keeps 15 characters
   SchedulingPolicy policy = SchedulingPolicy::Normal;
-  int priority = 0;       ///< 1 to 99 for Fifo; ignored for Normal
-  std::vector<int> cpus;  ///< empty: those of the thread that starts it
+  int priority = 0;            ///< 1 to 99 for Fifo; ignored for Normal
+  std::vector<int> cpus = {};  ///< empty: those of the thread that starts it
 };
 
 /// A thread with a name, a policy and a stop token that joins when it is destroyed (after asking it to stop). Thread-bound: the

@@ -5,20 +5,23 @@
 #include "config/config.h"
 #include "core/image_view.h"
 #include "slam/features.h"
+#include "slam/simd_level.h"
 
 namespace posed {
 
 /// ORB features: FAST-9 corners on an image pyramid, spread over the image by a quad-tree, oriented by the intensity centroid and
-/// described by rotated BRIEF. Sources: Rublee et al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011; Rosten and Drummond,
-/// "Machine learning for high-speed corner detection", ECCV 2006 (FAST); quad-tree distribution as described in Mur-Artal, Montiel,
-/// Tardos, "ORB-SLAM", T-RO 2015, section III-B.
+/// described by rotated BRIEF. Sources: Rublee et al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011; Rosten and
+/// Drummond, "Machine learning for high-speed corner detection", ECCV 2006 (FAST); quad-tree distribution as described in
+/// Mur-Artal, Montiel, Tardos, "ORB-SLAM", T-RO 2015, section III-B.
 ///
 /// All buffers are allocated at construction: `extract` does not allocate once its output vectors have grown, takes no lock and
-/// starts no thread. All arithmetic that decides anything is integer or of fixed order, so the result is the same on every instruction
-/// set (the SIMD kernels are chosen at construction by what the processor offers). Reentrant: one extractor a thread.
+/// starts no thread. All arithmetic that decides anything is integer or of fixed order, so the result is the same on every
+/// instruction set (the SIMD kernels are chosen at construction by what the processor offers). Reentrant: one extractor a thread.
 class OrbExtractor {
  public:
   OrbExtractor(const TrackerConfig& config, int width, int height);
+  /// With the kernels of one of `supported_simd_levels()`, for tests and benchmarks.
+  OrbExtractor(const TrackerConfig& config, int width, int height, SimdLevel simd_level);
   ~OrbExtractor();
   OrbExtractor(OrbExtractor&&) noexcept;
 

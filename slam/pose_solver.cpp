@@ -12,6 +12,10 @@ namespace {
 // 95 % quantiles of the chi-squared distribution with 2 and 3 degrees of freedom.
 constexpr double kChi2TwoDof = 5.991;
 constexpr double kChi2ThreeDof = 7.815;
+// Cutting residuals off at these bounds takes away the tails: what remains of Gaussian residuals has this share of their variance,
+// P(chi2_{d+2} < bound) / 0.95 for d degrees of freedom.
+constexpr double kKeptVarianceTwoDof = 0.8423;
+constexpr double kKeptVarianceThreeDof = 0.8771;
 constexpr double kMinDepth = 1e-3;  // [m] nearer, or behind: the projection says nothing
 
 struct Residual {
@@ -146,6 +150,7 @@ struct Classification {
   int changed = 0;
   double chi2 = 0;
   int residuals = 0;
+  double expected_chi2 = 0;  // of Gaussian residuals with the stated variances
 };
 
 Classification classify(const PinholeCamera& camera, const Se3& T_map_camera, std::span<PoseObservation> observations) {
@@ -160,6 +165,7 @@ Classification classify(const PinholeCamera& camera, const Se3& T_map_camera, st
       ++c.inliers;
       c.chi2 += chi2;
       c.residuals += o.disparity > 0 ? 3 : 2;
+      c.expected_chi2 += o.disparity > 0 ? 3 * kKeptVarianceThreeDof : 2 * kKeptVarianceTwoDof;
     }
   }
   return c;
@@ -190,8 +196,12 @@ PoseSolution solve_pose(const PinholeCamera& camera, const Se3& initial_T_map_ca
   if (factor.info() != Eigen::Success || !factor.isPositive() || factor.rcond() < 1e-12) {
     return solution;
   }
-  solution.variance_factor = c.chi2 / std::max(1, c.residuals - 6);
-  solution.covariance = solution.variance_factor * factor.solve(Matrix6d::Identity());
+  // With residuals cut off, the estimate scatters more than the inverse Hessian says, by the reciprocal of the kept variance: the
+  // asymptotic variance of a skipped mean (Huber, "Robust Statistics", 1981, section 4.7, with psi(x) = x up to the bound and 0 beyond).
+  const double kept_variance = c.expected_chi2 / c.residuals;
+  const double freedom = static_cast<double>(std::max(1, c.residuals - 6)) / c.residuals;
+  solution.variance_factor = c.chi2 / (freedom * c.expected_chi2);
+  solution.covariance = solution.variance_factor / kept_variance * factor.solve(Matrix6d::Identity());
   solution.inliers = c.inliers;
   solution.solved = solution.T_map_camera.is_finite() && solution.covariance.allFinite();
   return solution;

@@ -26,11 +26,11 @@ struct PoseSolverOptions {
 struct PoseSolution {
   bool solved = false;  ///< false: too few inliers or a degenerate geometry; the other members mean nothing then
   Se3 T_map_camera;
-  /// Of xi = (phi, rho) in T_map_camera * exp(xi) [rad, m], given the map: the inverse of the Gauss-Newton Hessian of the inliers, scaled
-  /// by their variance factor (sum of squared weighted residuals over the degrees of freedom).
+  /// Of xi = (phi, rho) in T_map_camera * exp(xi) [rad, m], given the map (whose own error is not in it): the inverse of the Gauss-Newton
+  /// Hessian of the inliers, scaled by their variance factor and corrected for the outliers' being cut off.
   Matrix6d covariance = Matrix6d::Zero();
   int inliers = 0;
-  double variance_factor = 1;
+  double variance_factor = 1;  ///< observed over stated variance of the residuals; 1: the stated noise is right
 };
 
 /// Minimises the robust reprojection error over the camera's pose, the landmarks held fixed. Residuals of an observation: both pixel

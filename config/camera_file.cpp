@@ -1,0 +1,98 @@
+#include "config/camera_file.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "config/config_loader.h"
+#include "config/strict_reader.h"
+#include "config/text_file.h"
+
+namespace posed {
+
+namespace {
+
+bool is_file(const std::filesystem::path& path) {
+  std::error_code ignored;  // what cannot be looked at is not there for us
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
+/// Whether the lens model maps distinct directions to distinct pixels across the image, so that it can be inverted: the radial
+/// factor times the radius must grow with the radius, up to the farthest corner.
+bool is_distortion_invertible(const CameraIntrinsics& k) {
+  const double x = std::max(k.cx, k.width - 1 - k.cx) / k.fx;
+  const double y = std::max(k.cy, k.height - 1 - k.cy) / k.fy;
+  constexpr int kSteps = 64;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double r2 = (x * x + y * y) * i / kSteps;
+    if (1.0 + r2 * (3.0 * k.k1 + r2 * (5.0 * k.k2 + r2 * 7.0 * k.k3)) <= 0.0) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> calibration_folders() {
+  std::vector<std::filesystem::path> folders;
+  if (const char* variable = std::getenv("POSED_CAMERA_PATH"); variable != nullptr) {
+    std::string_view rest = variable;
+    while (!rest.empty()) {
+      const std::string_view folder = rest.substr(0, rest.find(':'));
+      if (!folder.empty()) {
+        folders.emplace_back(folder);
+      }
+      rest.remove_prefix(std::min(rest.size(), folder.size() + 1));
+    }
+  }
+  folders.emplace_back(POSED_SOURCE_CAMERAS);
+  folders.emplace_back(POSED_INSTALLED_CAMERAS);
+  return folders;
+}
+
+Result<std::filesystem::path> find_calibration(const std::filesystem::path& name, std::vector<std::filesystem::path> folders) {
+  if (name.is_absolute()) {
+    return is_file(name) ? Result<std::filesystem::path>(name) : make_error(ErrorCode::Io, "there is no such file");
+  }
+  for (std::filesystem::path& folder : calibration_folders()) {
+    folders.push_back(std::move(folder));
+  }
+  std::string tried;
+  for (const std::filesystem::path& folder : folders) {
+    std::filesystem::path candidate = (folder / name).lexically_normal();
+    if (is_file(candidate)) {
+      return candidate;
+    }
+    tried += (tried.empty() ? "" : ", ") + candidate.string();
+  }
+  return make_error(ErrorCode::Io, fmt::format("there is no such file; looked for {}", tried));
+}
+
+Result<CameraIntrinsics> parse_camera(const std::string& text, const std::filesystem::path& name) {
+  CameraIntrinsics k;
+  StrictReader reader(name, camera_schema(k));
+  reader.read(text);
+  reader.require(k.cx <= k.width - 1, {"camera.cx", "camera.width"},
+                 fmt::format("outside of the image, allowed 0 to {}", k.width - 1));
+  reader.require(k.cy <= k.height - 1, {"camera.cy", "camera.height"},
+                 fmt::format("outside of the image, allowed 0 to {}", k.height - 1));
+  reader.require(is_distortion_invertible(k),
+                 {"camera.distortion", "camera.fx", "camera.fy", "camera.cx", "camera.cy", "camera.width", "camera.height"},
+                 "the lens model folds back on itself within the image, so it cannot be undone; check the coefficients' order k1, "
+                 "k2, p1, p2, k3");
+  return reader.status().map([&] { return k; });
+}
+
+Result<CameraIntrinsics> load_camera(const std::filesystem::path& path) {
+  const Result<std::filesystem::path> file = find_calibration(path, {""});
+  if (!file) {
+    return make_error(file.error().code, fmt::format("{}: cannot be read: {}", path.string(), file.error().message));
+  }
+  return read_text_file(*file).and_then([&](const std::string& text) { return parse_camera(text, *file); });
+}
+
+}  // namespace posed

@@ -1,0 +1,109 @@
+#include "config/config_loader.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "config/camera_file.h"
+#include "config/config_schema.h"
+#include "config/strict_reader.h"
+#include "config/text_file.h"
+
+namespace posed {
+
+namespace {
+
+/// Rules that tie keys together. The first key of a rule is blamed where the text has it.
+void check_rules(StrictReader& reader, const Config& c) {
+  reader.require(c.source.kind != SourceKind::Replay || !c.source.replay.sequence.empty(),
+                 {"source.kind", "source.replay.sequence"}, "needs source.replay.sequence, the folder of a recording");
+  reader.require(c.tracker.fast_threshold_minimum <= c.tracker.fast_threshold,
+                 {"tracker.fast_threshold_minimum", "tracker.fast_threshold"},
+                 fmt::format("tracker.fast_threshold_minimum ({}) must be at most tracker.fast_threshold ({})",
+                             c.tracker.fast_threshold_minimum, c.tracker.fast_threshold));
+  reader.require(
+      c.tracker.min_inliers < c.tracker.features, {"tracker.min_inliers", "tracker.features"},
+      fmt::format("tracker.min_inliers ({}) must be less than tracker.features ({})", c.tracker.min_inliers, c.tracker.features));
+  reader.require(c.mapper.local_keyframes <= c.mapper.max_keyframes, {"mapper.local_keyframes", "mapper.max_keyframes"},
+                 fmt::format("mapper.local_keyframes ({}) must be at most mapper.max_keyframes ({})", c.mapper.local_keyframes,
+                             c.mapper.max_keyframes));
+  reader.require(c.mapper.recovery_keyframes <= c.mapper.max_keyframes, {"mapper.recovery_keyframes", "mapper.max_keyframes"},
+                 fmt::format("mapper.recovery_keyframes ({}) must be at most mapper.max_keyframes ({})",
+                             c.mapper.recovery_keyframes, c.mapper.max_keyframes));
+  reader.require(c.pipeline.frame_slots >= c.pipeline.frame_queue + 2, {"pipeline.frame_slots", "pipeline.frame_queue"},
+                 fmt::format("pipeline.frame_slots ({}) must be at least pipeline.frame_queue ({}) + 2", c.pipeline.frame_slots,
+                             c.pipeline.frame_queue));
+}
+
+void check_thread(StrictReader& reader, const std::string& section, const ThreadConfig& thread) {
+  const std::string policy = section + ".policy";
+  const std::string priority = section + ".priority";
+  reader.require(thread.policy != ThreadPolicyName::Fifo || thread.priority >= 1, {priority, policy},
+                 fmt::format("policy \"fifo\" needs {} from 1 to 99", priority));
+}
+
+/// ORB describes a patch of 31 x 31 pixels, and FAST looks 3 pixels around a corner: nothing fits into a smaller image.
+void check_pyramid(StrictReader& reader, const Config& c) {
+  constexpr double kSmallestSide = 31 + 2 * 3;
+  const double side =
+      std::min(c.intrinsics.width, c.intrinsics.height) / std::pow(c.tracker.pyramid_scale, c.tracker.pyramid_levels - 1);
+  reader.require(
+      side >= kSmallestSide, {"tracker.pyramid_levels", "tracker.pyramid_scale", "camera.calibration"},
+      fmt::format("{} levels of scale {} leave {:.0f} pixels of a {}x{} image, needed are {:.0f}", c.tracker.pyramid_levels,
+                  c.tracker.pyramid_scale, side, c.intrinsics.width, c.intrinsics.height, kSmallestSide));
+}
+
+void resolve_path(const std::filesystem::path& folder, std::string& path) {
+  if (!path.empty() && !folder.empty()) {
+    path = (folder / path).lexically_normal().string();  // an absolute `path` stays as it is
+  }
+}
+
+/// Reads the calibration that `config` names; `folders` come before the shipped ones.
+void read_calibration(StrictReader& reader, std::vector<std::filesystem::path> folders, Config& config) {
+  const Result<std::filesystem::path> file = find_calibration(config.camera.calibration, std::move(folders));
+  if (!file) {
+    reader.require(false, {"camera.calibration"}, file.error().message);
+    return;
+  }
+  const Result<CameraIntrinsics> intrinsics = load_camera(*file);
+  if (!intrinsics) {
+    reader.add_foreign(intrinsics.error());
+    return;
+  }
+  config.camera.calibration = file->string();
+  config.intrinsics = *intrinsics;
+  check_pyramid(reader, config);
+}
+
+Result<Config> read_config(const std::string& text, const std::filesystem::path& name, std::vector<std::filesystem::path> folders) {
+  Config config;
+  StrictReader reader(name, config_schema(config));
+  reader.read(text);
+  check_rules(reader, config);
+  check_thread(reader, "pipeline.capture", config.pipeline.capture);
+  check_thread(reader, "pipeline.tracker", config.pipeline.tracker);
+  check_thread(reader, "pipeline.mapper", config.pipeline.mapper);
+  check_thread(reader, "pipeline.publisher", config.pipeline.publisher);
+  resolve_path(name.parent_path(), config.source.replay.sequence);
+  resolve_path(name.parent_path(), config.source.replay.associations);
+  read_calibration(reader, std::move(folders), config);
+  return reader.status().map([&] { return config; });
+}
+
+}  // namespace
+
+Result<Config> load_config(const std::filesystem::path& path) {
+  return read_text_file(path).and_then([&](const std::string& text) { return parse_config(text, path); });
+}
+
+Result<Config> parse_config(const std::string& text, const std::filesystem::path& name) {
+  return read_config(text, name, {name.parent_path()});
+}
+
+Result<Config> default_config() {
+  return read_config("", "built-in defaults", {});
+}
+
+}  // namespace posed

@@ -1,0 +1,263 @@
+#include "config/config_schema.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace posed {
+
+namespace {
+
+template <typename Enum>
+using Names = std::vector<std::pair<std::string_view, Enum>>;
+
+template <typename Enum>
+ChoiceField choice(Enum& value, Names<Enum> names) {
+  ChoiceField field;
+  for (const auto& [name, unused] : names) {
+    field.names.push_back(name);
+  }
+  field.get = [&value, names] {
+    return std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.second == value; })->first;
+  };
+  field.set = [&value, names](std::string_view text) {
+    value = std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.first == text; })->second;
+  };
+  return field;
+}
+
+ChoiceField choice(std::string& value, std::vector<std::string_view> names) {
+  return {std::move(names), [&value] { return std::string_view(value); }, [&value](std::string_view text) { value = text; }};
+}
+
+IntegerField integer(int& value, int minimum, int maximum) {
+  return {&value, minimum, maximum};
+}
+IntegerField integer(std::int64_t& value, std::int64_t minimum, std::int64_t maximum) {
+  return {&value, minimum, maximum};
+}
+RealField real(double& value, double minimum, double maximum) {
+  return {&value, minimum, maximum};
+}
+
+bool is_path(std::string_view text) {
+  return text.find('\0') == std::string_view::npos;
+}
+
+bool is_file_name(std::string_view text) {
+  return !text.empty() && is_path(text);
+}
+
+bool is_lcm_url(std::string_view text) {
+  const std::size_t colon = text.find("://");
+  const auto is_visible = [](char c) { return c > ' ' && c < 0x7F; };
+  const auto is_letter = [](char c) { return c >= 'a' && c <= 'z'; };
+  return colon != std::string_view::npos && colon > 0 && std::all_of(text.begin(), text.end(), is_visible) &&
+         std::all_of(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(colon), is_letter);
+}
+
+/// LCM allows 63 characters in a channel's name; the longest of ours after the prefix stays below 32.
+bool is_channel_prefix(std::string_view text) {
+  return text.size() <= 31 && std::all_of(text.begin(), text.end(), [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+         });
+}
+
+/// Collects sections; names keys by their section.
+class SchemaBuilder {
+ public:
+  SchemaBuilder& section(std::string name, std::string_view description) {
+    schema_.push_back({std::move(name), description, {}});
+    return *this;
+  }
+
+  SchemaBuilder& key(std::string_view name, Field field, std::string_view unit, std::string_view description) {
+    SchemaSection& section = schema_.back();
+    section.keys.push_back({section.name + "." + std::string(name), std::move(field), unit, description});
+    return *this;
+  }
+
+  /// The file must have the key added last.
+  SchemaBuilder& required() {
+    schema_.back().keys.back().required = true;
+    return *this;
+  }
+
+  Schema build() && { return std::move(schema_); }
+
+ private:
+  Schema schema_;
+};
+
+void add_source(SchemaBuilder& schema, SourceConfig& c) {
+  schema.section("source", "Where frames come from and how fast.")
+      .key("kind", choice(c.kind, {{"synthetic", SourceKind::Synthetic}, {"replay", SourceKind::Replay}}), "",
+           "`synthetic` renders a room with walking people; `replay` reads a recording.")
+      .key("pacing", choice(c.pacing, {{"realtime", Pacing::Realtime}, {"lockstep", Pacing::Lockstep}}), "",
+           "`realtime` delivers frames when their stamps say and drops what cannot be kept up with; `lockstep` processes every "
+           "frame, as "
+           "fast as possible, and repeats exactly.");
+  schema.section("source.replay", "A recording in the TUM RGB-D layout, for `kind = \"replay\"`.")
+      .key("sequence", TextField{&c.replay.sequence, {"the path of a folder", is_path}}, "",
+           "Folder of the recording, with rgb.txt and depth.txt. A relative path starts at this file's folder. Must be set for "
+           "`kind = \"replay\"`.")
+      .key("associations", TextField{&c.replay.associations, {"the path of a file, or \"\"", is_path}}, "",
+           "File of lines `colour-stamp colour-path depth-stamp depth-path`. A relative path starts at this file's folder. Empty: "
+           "colour and depth are paired by their stamps.")
+      .key("max_stamp_difference_s", real(c.replay.max_stamp_difference_s, 0.0, 1.0), "s",
+           "Colour and depth images whose stamps differ by more are not paired.")
+      .key("decode_ahead", integer(c.replay.decode_ahead, 1, 64), "frames",
+           "Images decoded before they are due, on a thread of their own.")
+      .key("loop", BoolField{&c.replay.loop}, "", "Begin again at the end of the recording.");
+  schema.section("source.synthetic", "The rendered room, for `kind = \"synthetic\"`. Its image size is the calibration's.")
+      .key("mode", choice(c.synthetic.mode, {{"sitting", SyntheticMode::Sitting}, {"walking", SyntheticMode::Walking}}), "",
+           "What the people do: `sitting` moves heads and arms, `walking` crosses the view.")
+      .key("people", integer(c.synthetic.people, 0, 20), "", "People in the room.")
+      .key("seed", integer(c.synthetic.seed, 0, std::numeric_limits<std::int64_t>::max()), "",
+           "Of the random room, motion and noise: the same seed renders the same frames.")
+      .key("rate_hz", real(c.synthetic.rate_hz, 1.0, 240.0), "Hz", "Frame rate.")
+      .key("duration_s", real(c.synthetic.duration_s, 0.0, 1e6), "s", "Length of the simulation; 0 is endless.")
+      .key("sensor_noise", BoolField{&c.synthetic.sensor_noise}, "",
+           "Add the noise, quantisation and holes of a real depth camera.");
+}
+
+void add_camera(SchemaBuilder& schema, CameraConfig& c) {
+  schema.section("camera", "The camera and where it sits on the robot.")
+      .key("calibration", TextField{&c.calibration, {"the name of a file", is_file_name}}, "",
+           "Camera calibration file. A relative name is looked for beside this file, then in the folders of $POSED_CAMERA_PATH, "
+           "then "
+           "among the shipped calibrations.")
+      .key("T_base_camera", PoseField{&c.T_base_camera}, "m",
+           "Pose of the camera (x right, y down, z forward) in the robot's base frame: it maps camera coordinates to base "
+           "coordinates.")
+      .key("T_map_start", PoseField{&c.T_map_start}, "m",
+           "Pose of the base in the map at the start, so that the map can be level or begin at a surveyed point.");
+}
+
+void add_tracker(SchemaBuilder& schema, TrackerConfig& c) {
+  schema.section("tracker", "Pose of every frame against the local map.")
+      .key("features", integer(c.features, 100, 5000), "keypoints", "ORB keypoints extracted from a frame.")
+      .key("pyramid_levels", integer(c.pyramid_levels, 1, 12), "", "Levels of the image pyramid.")
+      .key("pyramid_scale", real(c.pyramid_scale, 1.05, 2.0), "", "Ratio of the image sizes of neighbouring levels.")
+      .key("fast_threshold", integer(c.fast_threshold, 1, 200), "grey levels", "Contrast that the FAST corner test asks for first.")
+      .key("fast_threshold_minimum", integer(c.fast_threshold_minimum, 1, 200), "grey levels",
+           "Contrast asked for in those parts of an image that have no corner at `fast_threshold`. At most `fast_threshold`.")
+      .key("close_depth_m", real(c.close_depth_m, 0.1, 20.0), "m",
+           "Keypoints up to this depth become landmarks with the keyframe that sees them; beyond, depth is too noisy to trust "
+           "alone.")
+      .key("min_inliers", integer(c.min_inliers, 6, 500), "landmarks",
+           "A pose that fewer landmarks agree with is not trusted and the state becomes lost. Less than `features`.")
+      .key("keyframe_max_interval", integer(c.keyframe_max_interval, 1, 1000), "frames", "A keyframe is made at least this often.")
+      .key("keyframe_inlier_ratio", real(c.keyframe_inlier_ratio, 0.1, 1.0), "",
+           "A keyframe is made when less than this share of the reference keyframe's landmarks is seen.");
+}
+
+void add_mapper(SchemaBuilder& schema, MapperConfig& c) {
+  schema.section("mapper", "The map of keyframes and landmarks.")
+      .key("max_keyframes", integer(c.max_keyframes, 2, 10000), "keyframes", "Keyframes kept in the map.")
+      .key("local_landmarks", integer(c.local_landmarks, 100, 50000), "landmarks",
+           "Most landmarks of the local map that the tracker matches against.")
+      .key("local_keyframes", integer(c.local_keyframes, 1, 1000), "keyframes",
+           "Keyframes whose landmarks make the local map. At most `max_keyframes`.")
+      .key("recovery_keyframes", integer(c.recovery_keyframes, 1, 1000), "keyframes",
+           "Recent keyframes that a lost tracker matches against. At most `max_keyframes`.");
+}
+
+void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {
+  schema.section("publisher", "What is published over LCM.")
+      .key("url", TextField{&c.url, {"an LCM address such as \"udpm://239.255.76.67:7667?ttl=0\"", is_lcm_url}}, "",
+           "LCM's address. `ttl=0` keeps messages on this computer, `ttl=1` lets them onto the local network.")
+      .key("channel_prefix", TextField{&c.channel_prefix, {"at most 31 letters, digits and underscores", is_channel_prefix}}, "",
+           "What the names of all channels begin with.")
+      .key("status_period_s", real(c.status_period_s, 0.1, 60.0), "s", "Time between two status messages.")
+      .key("retry_period_s", real(c.retry_period_s, 0.1, 3600.0), "s",
+           "Time between two attempts to start LCM, where it cannot start.")
+      .key("bot_core_pose", BoolField{&c.bot_core_pose}, "",
+           "Also publish the pose of the base as `bot_core.pose_t`, on the channel BOT_POSE after the prefix.");
+}
+
+void add_thread(SchemaBuilder& schema, const std::string& thread, std::string_view description, ThreadConfig& c) {
+  constexpr int kMaxCpus = 1024;  // glibc's CPU_SETSIZE
+  schema.section("pipeline." + thread, description)
+      .key("policy", choice(c.policy, {{"normal", ThreadPolicyName::Normal}, {"fifo", ThreadPolicyName::Fifo}}), "",
+           "Scheduling: `normal`, or `fifo` for SCHED_FIFO, which needs the permission (CAP_SYS_NICE or an rtprio limit). Where it "
+           "is refused the thread "
+           "runs as `normal`, with a warning.")
+      .key("priority", integer(c.priority, 0, 99), "", "For `fifo`, 1 (low) to 99; `normal` ignores it.")
+      .key("cpus", IntegerListField{&c.cpus, 0, kMaxCpus - 1, kMaxCpus}, "", "Processors that the thread may run on; empty: all.");
+}
+
+void add_pipeline(SchemaBuilder& schema, PipelineConfig& c) {
+  schema.section("pipeline", "Buffers between the threads. All are allocated at start.")
+      .key("frame_slots", integer(c.frame_slots, 3, 256), "frames",
+           "Frames in memory. At least `frame_queue` + 2: one is being filled and one is being tracked.")
+      .key("frame_queue", integer(c.frame_queue, 1, 64), "frames",
+           "Frames that wait for the tracker; when full the oldest is dropped.")
+      .key("keyframe_queue", integer(c.keyframe_queue, 1, 64), "keyframes",
+           "Keyframes that wait for the mapper; while it is full the tracker makes none.")
+      .key("publish_queue", integer(c.publish_queue, 1, 4096), "poses",
+           "Poses that wait for the publisher; when full the oldest is dropped.");
+  add_thread(schema, "capture", "The thread that takes frames from the source.", c.capture);
+  add_thread(schema, "tracker", "The thread that computes poses.", c.tracker);
+  add_thread(schema, "mapper", "The thread that keeps the map.", c.mapper);
+  add_thread(schema, "publisher", "The thread that sends messages.", c.publisher);
+}
+
+}  // namespace
+
+Schema config_schema(Config& config) {
+  SchemaBuilder schema;
+  add_source(schema, config.source);
+  add_camera(schema, config.camera);
+  add_tracker(schema, config.tracker);
+  add_mapper(schema, config.mapper);
+  add_publisher(schema, config.publisher);
+  add_pipeline(schema, config.pipeline);
+  schema.section("logging", "Messages for people, on standard error.")
+      .key("level", choice(config.logging.level, {"debug", "info", "warning", "error", "off"}), "",
+           "Least severe messages that are shown.");
+  return std::move(schema).build();
+}
+
+Schema camera_schema(CameraIntrinsics& k) {
+  constexpr int kMaxSide = 8192;
+  SchemaBuilder schema;
+  schema.section("camera", "A pinhole camera with radial-tangential distortion; depth is registered to colour.")
+      .key("width", integer(k.width, 32, kMaxSide), "pixels", "Image width.")
+      .required()
+      .key("height", integer(k.height, 32, kMaxSide), "pixels", "Image height.")
+      .required()
+      .key("fx", real(k.fx, 10.0, 1e5), "pixels", "Horizontal focal length.")
+      .required()
+      .key("fy", real(k.fy, 10.0, 1e5), "pixels", "Vertical focal length.")
+      .required()
+      .key("cx", real(k.cx, 0.0, kMaxSide), "pixels",
+           "Principal point's column, inside the image; the centre of the first pixel is 0.")
+      .required()
+      .key("cy", real(k.cy, 0.0, kMaxSide), "pixels", "Principal point's row, inside the image.")
+      .required()
+      .key("distortion", RealListField{{&k.k1, &k.k2, &k.p1, &k.p2, &k.k3}, -10.0, 10.0}, "",
+           "Distortion k1, k2, p1, p2, k3 of the Brown-Conrady model, in OpenCV's order. All 0, or left out: none.")
+      .key("depth_units_per_metre", real(k.depth_units_per_metre, 1.0, 1e6), "1/m",
+           "A raw 16-bit depth divided by this is in metres.")
+      .required()
+      .key("baseline_fx", real(k.baseline_fx, 0.1, 1e4), "pixel m",
+           "Baseline times `fx` of the virtual stereo camera, whose right image sees a point at depth z at column u - baseline_fx "
+           "/ z. It weighs "
+           "depth against pixels in the pose: the depth sensor's own baseline is the natural choice.")
+      .required();
+  return std::move(schema).build();
+}
+
+const SchemaKey* find_key(const Schema& schema, std::string_view name) {
+  for (const SchemaSection& section : schema) {
+    for (const SchemaKey& key : section.keys) {
+      if (key.name == name) {
+        return &key;
+      }
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace posed

@@ -1,0 +1,26 @@
+#include "daemon/app.h"
+
+#include <utility>
+
+#include "daemon/message_transport.h"
+#include "daemon/pipeline.h"
+#include "daemon/slam_ports.h"
+
+namespace posed {
+
+Result<std::unique_ptr<App>> App::create(const Config& config, AppOptions options, const Clock& clock) {
+  Result<std::unique_ptr<RgbdSource>> source = make_rgbd_source(config.source, config.intrinsics, clock);
+  if (!source) {
+    return tl::unexpected<Error>(source.error());
+  }
+  PipelineParts parts;
+  parts.source = std::move(*source);
+  parts.tracker = make_frame_tracker(config);
+  parts.mapper = make_keyframe_mapper(config);
+  if (options.publish) {
+    parts.transport = std::make_unique<LcmTransport>(config.publisher.url);
+  }
+  return make_pipeline(config, std::move(options), clock, std::move(parts));
+}
+
+}  // namespace posed

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <stop_token>
+
+#include "core/frame_pool.h"
+#include "core/metrics.h"
+#include "core/result.h"
+#include "daemon/health.h"
+#include "daemon/stage_link.h"
+#include "drivers/rgbd_source.h"
+
+namespace posed {
+
+/// Takes frames from the source and counts what becomes of them. Thread-bound to the capture thread, but for `report`, which is
+/// thread-safe. After the source's start it neither allocates nor locks, but for what `on_error` does, which only errors cause.
+class CaptureStage {
+ public:
+  /// `source` and `pool` must outlive the stage. `on_error` may be empty.
+  CaptureStage(RgbdSource& source, FramePool& pool, std::function<void(const Error&)> on_error);
+
+  /// Starts the source; false where it failed.
+  bool begin();
+
+  /// The source's next frame, into `frame`, which is empty where this one was lost; false at the end, on failure and on `stop`.
+  bool next(const std::stop_token& stop, FrameRef& frame);
+
+  /// The thread's body in real time: every frame goes into `out`, whose oldest makes way, and `out` is closed at the end.
+  void run(const std::stop_token& stop, FrameLink& out);
+
+  void report(HealthReport& health) const;
+
+ private:
+  void fail(const Error& error);
+
+  RgbdSource& source_;
+  FramePool& pool_;
+  std::function<void(const Error&)> on_error_;
+
+  Counter captured_;
+  Counter skipped_;
+  Counter no_slot_;
+  Counter dropped_;
+  std::atomic<bool> failed_{false};
+  std::atomic<bool> ended_{false};
+};
+
+}  // namespace posed

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/config.h"
+#include "core/clock.h"
+#include "core/estimates.h"
+#include "core/metrics.h"
+#include "core/se3.h"
+#include "daemon/health.h"
+#include "daemon/message_transport.h"
+
+namespace posed {
+
+/// Turns estimates and health into messages and sends them; keeps trying where the transport cannot start. Thread-bound to the
+/// publisher thread, but for `report`, which is thread-safe. Its clock decides when status and retries are due, so tests need not
+/// wait.
+class Publisher {
+ public:
+  /// `clock` must outlive it. `health` is asked whenever a status is due.
+  Publisher(const PublisherConfig& config, const Se3& T_base_camera, std::unique_ptr<MessageTransport> transport,
+            const Clock& clock, std::function<HealthReport()> health);
+
+  /// Sends the pose (and the bot_core pose where it is configured), stamped with `publish_ns`.
+  void publish(const PoseEstimate& estimate, TimeNs publish_ns);
+
+  /// Does what is due by now: opens the transport, sends a status. Returns when it wants to be called next [ns, monotonic].
+  TimeNs do_due_work();
+
+  /// Sends a status now: at the end of the source and before a stop.
+  void publish_status();
+
+  void report(HealthReport& health) const;
+
+ private:
+  void open_transport(TimeNs now_ns);
+
+  /// Encodes and sends; true where the transport took it.
+  template <typename Message>
+  bool send(const std::string& channel, const Message& message);
+
+  /// Keeps `transport_up` and the log.
+  void note(const Status& outcome);
+
+  PublisherConfig config_;
+  struct Channels {
+    std::string pose;
+    std::string status;
+    std::string bot_pose;
+  } channels_;
+  Se3 T_base_camera_;
+  std::unique_ptr<MessageTransport> transport_;
+  const Clock& clock_;
+  std::function<HealthReport()> health_;
+
+  bool open_ = false;
+  bool complained_ = false;  // of the present trouble
+  TimeNs last_failure_ns_ = 0;
+  TimeNs next_open_ns_ = 0;
+  TimeNs next_status_ns_ = 0;
+  std::vector<std::uint8_t> buffer_;
+
+  Counter poses_published_;
+  Counter errors_;
+  std::atomic<bool> up_{false};
+};
+
+}  // namespace posed

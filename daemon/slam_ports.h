@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "config/config.h"
+#include "core/estimates.h"
+#include "core/rgbd_frame.h"
+#include "slam/keyframe_record.h"
+#include "slam/map_snapshot.h"
+
+namespace posed {
+
+/// The tracker as the pipeline sees it (slam/tracker.h says what is asked of it), so that the pipeline can be tested without
+/// vision. Thread-bound.
+class FrameTracker {
+ public:
+  virtual ~FrameTracker() = default;
+  virtual PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) = 0;
+};
+
+/// The mapper as the pipeline sees it (slam/local_mapper.h). Thread-bound.
+class KeyframeMapper {
+ public:
+  virtual ~KeyframeMapper() = default;
+  virtual void insert(const KeyframeRecord& record) = 0;
+  virtual void write_snapshot(MapSnapshot& snapshot) const = 0;
+  virtual std::optional<Se3> keyframe_pose(KeyframeId id) const = 0;
+  virtual std::size_t keyframe_count() const = 0;
+  virtual std::size_t landmark_count() const = 0;
+};
+
+/// The real ones. Reentrant.
+std::unique_ptr<FrameTracker> make_frame_tracker(const Config& config);
+std::unique_ptr<KeyframeMapper> make_keyframe_mapper(const Config& config);
+
+}  // namespace posed

@@ -1,0 +1,181 @@
+#include "daemon/supervisor.h"
+
+#include <csignal>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+#include <systemd/sd-daemon.h>
+#include <systemd/sd-event.h>
+
+#include "core/logging.h"
+
+namespace posed {
+
+namespace {
+
+constexpr std::size_t kSourceErrorsKept = 16;  // between two looks
+
+void notify_systemd(const std::string& state) {
+  sd_notify(0, state.c_str());
+}  // does nothing without $NOTIFY_SOCKET
+
+}  // namespace
+
+/// sd-event with the two things the daemon waits for: a signal that ends it, and the time to look.
+class Supervisor::EventLoop {
+ public:
+  EventLoop(TimeNs period_ns, std::function<bool()> look)
+      : period_us_(static_cast<std::uint64_t>(period_ns / kNsPerUs)), look_(std::move(look)) {}
+
+  /// The signal that ended the loop, or 0 where `look` did.
+  Result<int> run() {
+    sd_event* event = nullptr;
+    int status = sd_event_new(&event);
+    const std::unique_ptr<sd_event, decltype(&sd_event_unref)> owner(event, sd_event_unref);
+    for (const int signal : {SIGINT, SIGTERM}) {
+      if (status >= 0) {
+        status = sd_event_add_signal(event, nullptr, signal, &EventLoop::on_signal, nullptr);
+      }
+    }
+    if (status >= 0) {
+      status = sd_event_add_time_relative(event, nullptr, CLOCK_MONOTONIC, period_us_, kAccuracyUs, &EventLoop::on_time, this);
+    }
+    if (status >= 0) {
+      status = sd_event_loop(event);
+    }
+    if (status < 0) {
+      return make_error(ErrorCode::Unavailable, fmt::format("the event loop failed: {}", std::strerror(-status)));
+    }
+    return status;
+  }
+
+ private:
+  static constexpr std::uint64_t kAccuracyUs = 10'000;
+
+  static int on_signal(sd_event_source* source, const signalfd_siginfo* info, void*) {
+    return sd_event_exit(sd_event_source_get_event(source), static_cast<int>(info->ssi_signo));
+  }
+
+  static int on_time(sd_event_source* source, std::uint64_t, void* self) {
+    auto* const loop = static_cast<EventLoop*>(self);
+    if (loop->look_()) {
+      return sd_event_exit(sd_event_source_get_event(source), 0);
+    }
+    const int status = sd_event_source_set_time_relative(source, loop->period_us_);
+    return status < 0 ? status : sd_event_source_set_enabled(source, SD_EVENT_ONESHOT);
+  }
+
+  std::uint64_t period_us_;
+  std::function<bool()> look_;
+};
+
+Supervisor::Supervisor(SupervisorOptions options) : options_(options), source_errors_(kSourceErrorsKept) {}
+
+Status Supervisor::block_termination_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  if (const int error = pthread_sigmask(SIG_BLOCK, &signals, nullptr); error != 0) {
+    return make_error(ErrorCode::Unavailable, fmt::format("the signals cannot be blocked: {}", std::strerror(error)));
+  }
+  return {};
+}
+
+std::function<void(const Error&)> Supervisor::source_error_sink() {
+  return [this](const Error& error) {
+    if (source_errors_.push(error)) {
+      source_errors_dropped_.add();
+    }
+  };
+}
+
+Result<RunEnd> Supervisor::run(App& app) {
+  if (const Status started = app.start(); !started) {
+    return tl::unexpected<Error>(started.error());
+  }
+  log_info("running: {}", app.source_info().description);
+  notify_systemd("READY=1\nSTATUS=running: " + app.source_info().description);
+  last_log_ns_ = SystemClock::instance().now_ns();
+  next_health_log_ns_ = last_log_ns_ + options_.health_log_period_ns;
+
+  EventLoop loop(options_.poll_period_ns, [&] { return look(app); });
+  const Result<int> ended_by = loop.run();
+
+  notify_systemd("STOPPING=1\nSTATUS=stopping");
+  if (ended_by && *ended_by != 0) {
+    log_info("stopping: {}", *ended_by == SIGINT ? "SIGINT" : "SIGTERM");
+  }
+  app.stop();
+  log_source_errors();
+  const HealthReport health = app.health();
+  log_health(health);
+  if (!ended_by) {
+    return tl::unexpected<Error>(ended_by.error());
+  }
+  if (*ended_by != 0) {
+    return RunEnd::Signal;
+  }
+  return health.source_failed ? RunEnd::SourceFailed : RunEnd::SourceEnded;
+}
+
+bool Supervisor::look(App& app) {
+  log_source_errors();
+  const HealthReport health = app.health();
+  const TimeNs now_ns = SystemClock::instance().now_ns();
+  if (!looked_ || health.state != state_) {
+    looked_ = true;
+    state_ = health.state;
+    log_info("state: {}", to_string(state_));
+    notify_systemd(fmt::format("STATUS={}", to_string(state_)));
+  }
+  if (now_ns >= next_health_log_ns_) {
+    log_health(health);
+    next_health_log_ns_ = now_ns + options_.health_log_period_ns;
+  }
+  if (!source_done_ && app.wait_finished(0)) {
+    source_done_ = true;
+    log_info("the source has {}; every frame is processed", health.source_failed ? "failed" : "ended");
+  }
+  return source_done_ && options_.exit_at_end;
+}
+
+void Supervisor::log_source_errors() {
+  while (const std::optional<Error> error = source_errors_.pop()) {
+    log_warning("source: {}", error->message);
+  }
+  const std::uint64_t dropped = source_errors_dropped_.value();
+  if (dropped != source_errors_dropped_logged_) {
+    log_warning("source: {} more errors, too fast to log them", dropped - source_errors_dropped_logged_);
+    source_errors_dropped_logged_ = dropped;
+  }
+}
+
+void Supervisor::log_health(const HealthReport& health) {
+  const TimeNs now_ns = SystemClock::instance().now_ns();
+  const std::uint64_t frames = health.frames_tracked + health.frames_lost;
+  const double elapsed_s = to_seconds(now_ns - last_log_ns_);
+  const double rate_hz = elapsed_s > 0 ? static_cast<double>(frames - frames_at_last_log_) / elapsed_s : 0;
+  const std::string line = describe(health, rate_hz);
+  log_info("{}", line);
+  notify_systemd("STATUS=" + line);
+  last_log_ns_ = now_ns;
+  frames_at_last_log_ = frames;
+}
+
+std::string describe(const HealthReport& health, double rate_hz) {
+  const std::uint64_t lost_before_tracker = health.frames_skipped + health.frames_no_slot + health.frames_dropped;
+  std::string line = fmt::format(
+      "{}{}, {:.1f} frames/s; frames tracked {}, lost {}, not processed {}; poses published {}, dropped {}, errors {}; track p50 "
+      "{:.1f} ms p99 "
+      "{:.1f} ms; capture to publish p50 {:.1f} ms p99 {:.1f} ms; map {} keyframes, {} landmarks",
+      to_string(health.state), health.source_failed ? ", source failed" : "", rate_hz, health.frames_tracked, health.frames_lost,
+      lost_before_tracker, health.poses_published, health.poses_dropped, health.publish_errors, health.track.p50_ms,
+      health.track.p99_ms, health.latency.p50_ms, health.latency.p99_ms, health.map_keyframes, health.map_landmarks);
+  return line;
+}
+
+}  // namespace posed

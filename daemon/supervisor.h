@@ -1,0 +1,64 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "core/clock.h"
+#include "core/metrics.h"
+#include "core/overflow_ring.h"
+#include "core/result.h"
+#include "daemon/app.h"
+
+namespace posed {
+
+struct SupervisorOptions {
+  bool exit_at_end = false;  ///< end when the source has ended or failed; otherwise a signal alone ends it
+  TimeNs poll_period_ns = 200 * kNsPerMs;
+  TimeNs health_log_period_ns = 30 * kNsPerSecond;
+};
+
+/// Why a run ended.
+enum class RunEnd { Signal, SourceEnded, SourceFailed };
+
+/// The main thread's part: runs the pipeline under sd-event until a signal (SIGINT, SIGTERM) or the end of the source, writes the
+/// log that the pipeline's threads must not write, and tells systemd how things stand where $NOTIFY_SOCKET is set. Thread-bound to
+/// the main thread. Must outlive the App that was given its `source_error_sink`.
+class Supervisor {
+ public:
+  explicit Supervisor(SupervisorOptions options);
+
+  /// Blocks the signals that end the daemon in the calling thread and those it starts, so that the event loop alone receives them:
+  /// call it before any thread exists.
+  static Status block_termination_signals();
+
+  /// For AppOptions::on_source_error: passes errors from the capture thread to the log without waiting for the log.
+  std::function<void(const Error&)> source_error_sink();
+
+  /// Starts `app`, runs until the end and stops it. Error: Unavailable, where the event loop or a thread cannot be set up.
+  Result<RunEnd> run(App& app);
+
+ private:
+  class EventLoop;
+
+  /// Logs what happened since the last look; true where the run has come to its end.
+  bool look(App& app);
+  void log_source_errors();
+  void log_health(const HealthReport& health);
+
+  SupervisorOptions options_;
+  OverflowRing<Error> source_errors_;
+  Counter source_errors_dropped_;
+  std::uint64_t source_errors_dropped_logged_ = 0;
+
+  bool looked_ = false;
+  TrackingState state_ = TrackingState::Initializing;
+  bool source_done_ = false;
+  TimeNs next_health_log_ns_ = 0;
+  std::uint64_t frames_at_last_log_ = 0;
+  TimeNs last_log_ns_ = 0;
+};
+
+/// One line for people: state, rate, latencies, losses, map. `rate_hz` is of frames processed. Reentrant.
+std::string describe(const HealthReport& health, double rate_hz);
+
+}  // namespace posed

@@ -1,0 +1,68 @@
+#include "daemon/tracking_stage.h"
+
+#include <optional>
+
+namespace posed {
+
+TrackingStage::TrackingStage(FrameTracker& tracker, Outputs outputs, const Clock& clock, FullQueue full_queue)
+    : tracker_(tracker), outputs_(outputs), clock_(clock), full_queue_(full_queue) {}
+
+void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
+  outputs_.snapshots.refresh();
+  KeyframeRecord* const candidate = outputs_.keyframes.ring.claim();
+  if (candidate == nullptr) {
+    keyframes_delayed_.add();
+  }
+
+  const TimeNs begin_ns = clock_.now_ns();
+  PoseEstimate estimate = tracker_.track(frame, outputs_.snapshots.front(), candidate);
+  estimate.track_ns = clock_.now_ns() - begin_ns;
+
+  track_time_.record(estimate.track_ns);
+  state_.store(estimate.state, std::memory_order_relaxed);
+  (estimate.has_pose() ? tracked_ : lost_).add();
+  if (estimate.keyframe && candidate != nullptr) {
+    keyframes_.add();
+    outputs_.keyframes.ring.commit();
+    outputs_.keyframes.notify_arrived();
+  }
+  hand_on(estimate, stop);
+}
+
+void TrackingStage::hand_on(const PoseEstimate& estimate, const std::stop_token& stop) {
+  if (full_queue_ == FullQueue::Waits && !outputs_.estimates.wait_for_room(stop)) {
+    return;
+  }
+  if (const std::optional<PoseEstimate> oldest = outputs_.estimates.ring.push(estimate)) {
+    poses_dropped_.add();
+  }
+  outputs_.estimates.notify_arrived();
+}
+
+void TrackingStage::run(const std::stop_token& stop, FrameLink& in) {
+  in.consume(stop, [&] {
+    const std::optional<FrameRef> frame = in.ring.pop();
+    if (frame) {
+      track(**frame, stop);
+    }
+    return frame.has_value();
+  });
+  close_outputs();
+}
+
+void TrackingStage::close_outputs() {
+  outputs_.keyframes.close();
+  outputs_.estimates.close();
+}
+
+void TrackingStage::report(HealthReport& health) const {
+  health.state = state_.load(std::memory_order_relaxed);
+  health.frames_tracked = tracked_.value();
+  health.frames_lost = lost_.value();
+  health.keyframes = keyframes_.value();
+  health.keyframes_delayed = keyframes_delayed_.value();
+  health.poses_dropped = poses_dropped_.value();
+  health.track = track_time_.summary();
+}
+
+}  // namespace posed

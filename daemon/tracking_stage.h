@@ -1,0 +1,63 @@
+#pragma once
+
+#include <atomic>
+#include <stop_token>
+
+#include "core/clock.h"
+#include "core/latest_value.h"
+#include "core/metrics.h"
+#include "daemon/health.h"
+#include "daemon/slam_ports.h"
+#include "daemon/stage_link.h"
+#include "slam/map_snapshot.h"
+
+namespace posed {
+
+/// What happens to an estimate where the queue before the publisher is full.
+enum class FullQueue {
+  DropsOldest,  ///< real time: the newest pose matters, the loss is counted
+  Waits,        ///< lockstep: nothing is lost
+};
+
+/// Tracks frames against the newest map snapshot and hands poses to the publisher and keyframes to the mapper. Thread-bound to the
+/// tracking thread, but for `report`, which is thread-safe. Takes no lock, does not allocate and, with `FullQueue::DropsOldest`,
+/// does not wait for another stage.
+class TrackingStage {
+ public:
+  struct Outputs {
+    LatestValue<MapSnapshot>& snapshots;  ///< read here, written by the mapper
+    KeyframeLink& keyframes;
+    EstimateLink& estimates;
+  };
+
+  /// Everything passed in must outlive the stage.
+  TrackingStage(FrameTracker& tracker, Outputs outputs, const Clock& clock, FullQueue full_queue);
+
+  void track(const RgbdFrame& frame, const std::stop_token& stop);
+
+  /// The thread's body in real time: every frame of `in`; closes both outputs when `in` has ended.
+  void run(const std::stop_token& stop, FrameLink& in);
+
+  /// Tells mapper and publisher that nothing follows.
+  void close_outputs();
+
+  void report(HealthReport& health) const;
+
+ private:
+  void hand_on(const PoseEstimate& estimate, const std::stop_token& stop);
+
+  FrameTracker& tracker_;
+  Outputs outputs_;
+  const Clock& clock_;
+  FullQueue full_queue_;
+
+  std::atomic<TrackingState> state_{TrackingState::Initializing};
+  Counter tracked_;
+  Counter lost_;
+  Counter keyframes_;
+  Counter keyframes_delayed_;
+  Counter poses_dropped_;
+  LatencyHistogram track_time_;
+};
+
+}  // namespace posed

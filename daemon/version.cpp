@@ -1,0 +1,9 @@
+#include "daemon/version.h"
+
+namespace posed {
+
+std::string_view version() noexcept {
+  return POSED_VERSION;
+}
+
+}  // namespace posed

@@ -1,0 +1,119 @@
+#include "drivers/file_io.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <fcntl.h>
+#include <string>
+#include <system_error>
+#include <unistd.h>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+namespace posed {
+
+namespace {
+
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int fd) : fd_(fd) {}
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
+  ~FileDescriptor() {
+    if (fd_ >= 0) {
+      ::close(fd_);
+    }
+  }
+
+  int get() const { return fd_; }
+
+  /// Closes it with the error that a file system may have kept until now (quota, network).
+  int close() {
+    const int fd = std::exchange(fd_, -1);
+    return ::close(fd) == 0 ? 0 : errno;
+  }
+
+ private:
+  int fd_;
+};
+
+tl::unexpected<Error> system_error(const char* action, const std::filesystem::path& path, int error) {
+  const bool missing = error == ENOENT || error == ENOTDIR;
+  std::string hint;
+  if (error == ENOSPC || error == EDQUOT) {
+    hint = "; free some space or choose another folder";
+  }
+  return make_error(missing ? ErrorCode::NotFound : ErrorCode::Io,
+                    fmt::format("cannot {} {}: {}{}", action, path.string(), std::generic_category().message(error), hint));
+}
+
+/// 0, or the error number. A disk that fills up in the middle of a write first writes a part and reports with the next call.
+int write_all(int fd, std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno != EINTR) {
+      return errno;
+    }
+    if (written > 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+Status read_file(const std::filesystem::path& path, std::vector<std::uint8_t>& bytes, std::size_t max_bytes) {
+  // Without O_NONBLOCK, opening a named pipe that nobody writes to would wait for ever.
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct stat info {};
+  if (file.get() < 0 || ::fstat(file.get(), &info) != 0) {
+    return system_error("open", path, errno);
+  }
+  if (!S_ISREG(info.st_mode)) {
+    return make_error(ErrorCode::BadData, fmt::format("{} is not a regular file", path.string()));
+  }
+  const auto size = static_cast<std::size_t>(info.st_size);
+  if (size > max_bytes) {
+    return make_error(ErrorCode::BadData, fmt::format("{} has {} bytes; at most {} are read", path.string(), size, max_bytes));
+  }
+  bytes.resize(size);
+  std::size_t filled = 0;
+  while (filled < size) {
+    const ssize_t got = ::read(file.get(), bytes.data() + filled, size - filled);
+    if (got < 0 && errno != EINTR) {
+      return system_error("read", path, errno);
+    }
+    if (got == 0) {
+      return make_error(ErrorCode::BadData,
+                        fmt::format("{} shrank from {} to {} bytes while it was read", path.string(), size, filled));
+    }
+    filled += got > 0 ? static_cast<std::size_t>(got) : 0;
+  }
+  return {};
+}
+
+Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
+  const std::filesystem::path temporary = path.string() + ".part";
+  int error = 0;
+  {
+    FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    if (file.get() < 0) {
+      return system_error("create", temporary, errno);
+    }
+    error = write_all(file.get(), bytes);
+    const int close_error = file.close();
+    error = error != 0 ? error : close_error;
+  }
+  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) {
+    error = errno;
+  }
+  if (error != 0) {
+    ::unlink(temporary.c_str());
+    return system_error("write", path, error);
+  }
+  return {};
+}
+
+}  // namespace posed

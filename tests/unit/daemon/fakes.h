@@ -1,0 +1,211 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/clock.h"
+#include "core/frame_pool.h"
+#include "daemon/message_transport.h"
+#include "daemon/slam_ports.h"
+#include "drivers/rgbd_source.h"
+
+/// Stand-ins for everything around the pipeline, so that its own behaviour can be driven step by step.
+namespace posed {
+
+/// Time that moves only when a test says so; UTC runs `kUtcOffsetNs` ahead of it.
+class ManualClock final : public Clock {
+ public:
+  static constexpr std::int64_t kUtcOffsetNs = 1'700'000'000 * kNsPerSecond;
+
+  TimeNs now_ns() const noexcept override { return now_ns_; }
+  void sleep_until(TimeNs deadline_ns) const override { now_ns_ = deadline_ns; }
+  std::int64_t utc_ns(TimeNs monotonic_ns) const noexcept override { return monotonic_ns + kUtcOffsetNs; }
+  void advance(TimeNs by_ns) { now_ns_ += by_ns; }
+
+ private:
+  mutable TimeNs now_ns_ = 1'000 * kNsPerSecond;
+};
+
+/// Delivers what `script` says for call 0, 1, 2, ...; CaptureKind::Stopped there means: block until the stop is requested.
+class FakeSource final : public RgbdSource {
+ public:
+  using Script = std::function<CaptureKind(std::uint64_t call)>;
+
+  explicit FakeSource(Script script, Status start_status = {})
+      : script_(std::move(script)), start_status_(std::move(start_status)) {
+    info_.description = "fake";
+    info_.width = 16;
+    info_.height = 8;
+    info_.slots_held = 1;
+  }
+
+  /// `frames` frames, then the end.
+  static Script recording(std::uint64_t frames) {
+    return [frames](std::uint64_t call) { return call < frames ? CaptureKind::Frame : CaptureKind::EndOfStream; };
+  }
+
+  const SourceInfo& info() const override { return info_; }
+
+  Status start(FramePool& pool) override {
+    pool_ = &pool;
+    std::optional<FrameWriter> slot = pool.acquire();
+    if (start_status_ && slot) {
+      decoded_ahead_ = std::move(*slot).share();  // as a source does that decodes ahead: the pool must be there when this is given back
+    }
+    return start_status_;
+  }
+
+  Capture next(std::stop_token stop) override {
+    Capture capture;
+    capture.kind = script_(call_++);
+    if (capture.kind == CaptureKind::Stopped) {
+      while (!stop.stop_requested()) {
+        std::this_thread::yield();
+      }
+    } else if (capture.kind == CaptureKind::Frame) {
+      std::optional<FrameWriter> slot = pool_->acquire();
+      if (!slot) {
+        capture.kind = CaptureKind::NoFreeSlot;
+        return capture;
+      }
+      (*slot)->sequence = sequence_++;
+      (*slot)->capture_ns = SystemClock::instance().now_ns();
+      (*slot)->stamp_utc_ns = static_cast<std::int64_t>((*slot)->sequence) * kNsPerSecond;
+      capture.frame = std::move(*slot).share();
+    } else if (capture.kind == CaptureKind::SkippedFrame || capture.kind == CaptureKind::Failed) {
+      capture.error = Error{ErrorCode::BadData, "scripted"};
+    }
+    return capture;
+  }
+
+ private:
+  Script script_;
+  Status start_status_;
+  SourceInfo info_;
+  FramePool* pool_ = nullptr;
+  FrameRef decoded_ahead_;
+  std::uint64_t call_ = 0;
+  std::uint64_t sequence_ = 0;
+};
+
+/// Tracks every frame, makes every `keyframe_interval`-th one a keyframe, and reports the version of the map it was shown.
+class FakeTracker final : public FrameTracker {
+ public:
+  std::uint64_t keyframe_interval = 5;
+  std::function<TrackingState(std::uint64_t sequence)> state = [](std::uint64_t) { return TrackingState::Tracking; };
+  std::function<void(const RgbdFrame&)> on_frame = [](const RgbdFrame&) {};
+
+  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) override {
+    on_frame(frame);
+    PoseEstimate estimate;
+    estimate.sequence = frame.sequence;
+    estimate.capture_ns = frame.capture_ns;
+    estimate.stamp_utc_ns = frame.stamp_utc_ns;
+    estimate.state = state(frame.sequence);
+    estimate.map_version = map.version;
+    if (candidate != nullptr && frame.sequence % keyframe_interval == 0) {
+      candidate->id = ++keyframes_;
+      candidate->sequence = frame.sequence;
+      candidate->landmarks.assign(100, kNoLandmark);
+      estimate.keyframe = true;
+    }
+    return estimate;
+  }
+
+ private:
+  KeyframeId keyframes_ = 0;
+};
+
+/// A map that is nothing but its count of keyframes.
+class FakeMapper final : public KeyframeMapper {
+ public:
+  std::function<void()> on_insert = [] {};
+
+  void insert(const KeyframeRecord& record) override {
+    on_insert();
+    keyframes_.push_back(record.id);
+  }
+  void write_snapshot(MapSnapshot& snapshot) const override { snapshot.version = keyframes_.size(); }
+  std::optional<Se3> keyframe_pose(KeyframeId id) const override {
+    return id <= keyframes_.size() ? std::optional<Se3>(Se3()) : std::nullopt;
+  }
+  std::size_t keyframe_count() const override { return keyframes_.size(); }
+  std::size_t landmark_count() const override { return 7 * keyframes_.size(); }
+
+ private:
+  std::vector<KeyframeId> keyframes_;
+};
+
+/// Remembers what was sent; refuses when told to. Its state is shared with the test. Thread-safe.
+struct TransportLog {
+  struct Message {
+    std::string channel;
+    std::vector<std::uint8_t> bytes;
+  };
+
+  void append(const std::string& channel, std::span<const std::uint8_t> bytes) {
+    const std::lock_guard lock(mutex);
+    messages.push_back({channel, {bytes.begin(), bytes.end()}});
+  }
+
+  /// All messages of a channel, decoded.
+  template <typename T>
+  std::vector<T> decoded(const std::string& channel) {
+    const std::lock_guard lock(mutex);
+    std::vector<T> result;
+    for (const Message& message : messages) {
+      if (message.channel == channel) {
+        T value;
+        if (value.decode(message.bytes.data(), 0, static_cast<int>(message.bytes.size())) > 0) {
+          result.push_back(value);
+        }
+      }
+    }
+    return result;
+  }
+
+  std::mutex mutex;
+  std::vector<Message> messages;
+  std::atomic<int> opens{0};
+  std::atomic<int> opens_to_refuse{0};
+  std::atomic<bool> refuse_sends{false};
+};
+
+class FakeTransport final : public MessageTransport {
+ public:
+  explicit FakeTransport(std::shared_ptr<TransportLog> log) : log_(std::move(log)) {}
+
+  const std::string& description() const override { return url_; }
+
+  Status open() override {
+    log_->opens++;
+    if (log_->opens_to_refuse > 0) {
+      log_->opens_to_refuse--;
+      return make_error(ErrorCode::Unavailable, "no multicast route (fake)");
+    }
+    return {};
+  }
+
+  Status send(const std::string& channel, std::span<const std::uint8_t> message) override {
+    if (log_->refuse_sends) {
+      return make_error(ErrorCode::Io, "refused (fake)");
+    }
+    log_->append(channel, message);
+    return {};
+  }
+
+ private:
+  std::string url_ = "fake://";
+  std::shared_ptr<TransportLog> log_;
+};
+
+}  // namespace posed

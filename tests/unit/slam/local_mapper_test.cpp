@@ -1,0 +1,161 @@
+#include "slam/local_mapper.h"
+
+#include <algorithm>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/feature_world.h"
+
+namespace posed {
+namespace {
+
+Se3 shifted(double x, double yaw_rad = 0) { return Se3::exp((Vector6d() << 0, yaw_rad, 0, x, 0, 0).finished()); }
+
+struct LocalMapperTest : testing::Test {
+  FeatureWorld world{1};
+  TrackerConfig tracker = [] {
+    TrackerConfig t;
+    t.close_depth_m = 10;
+    return t;
+  }();
+  MapperConfig config;
+
+  MapSnapshot snapshot_of(const LocalMapper& mapper) {
+    MapSnapshot s;
+    mapper.write_snapshot(s);
+    return s;
+  }
+
+  /// Landmark id of every point that the snapshot holds.
+  std::vector<LandmarkId> landmarks_by_point(const MapSnapshot& s) {
+    std::vector<LandmarkId> ids(world.points().size(), kNoLandmark);
+    for (const SnapshotLandmark& l : s.landmarks) {
+      ids[world.point_of(l.descriptor)] = l.id;
+    }
+    return ids;
+  }
+
+  double mean_error_m(const MapSnapshot& s) {
+    double sum = 0;
+    for (const SnapshotLandmark& l : s.landmarks) {
+      sum += (l.p_map.cast<double>() - world.points()[world.point_of(l.descriptor)]).norm();
+    }
+    return sum / static_cast<double>(s.landmarks.size());
+  }
+};
+
+TEST_F(LocalMapperTest, FirstKeyframeTurnsItsDepthsIntoLandmarks) {
+  LocalMapper mapper(tracker, config, world.intrinsics);
+  const auto view = world.view(Se3());
+  mapper.insert(FeatureWorld::record(view, 1, {}));
+  const MapSnapshot s = snapshot_of(mapper);
+  EXPECT_EQ(s.version, 1U);
+  EXPECT_EQ(s.map_id, 1U);
+  EXPECT_EQ(s.newest_keyframe, 1U);
+  EXPECT_EQ(s.landmarks.size(), view.seen.size());
+  EXPECT_TRUE(std::is_sorted(s.landmarks.begin(), s.landmarks.end(), [](const auto& a, const auto& b) { return a.id < b.id; }));
+  EXPECT_LT(mean_error_m(s), 1e-3);
+  ASSERT_EQ(s.keyframes.size(), 1U);
+  EXPECT_EQ(s.keyframes[0].landmarks.size(), view.seen.size());
+}
+
+TEST_F(LocalMapperTest, LeavesOutDepthsThatAreMissingOrFar) {
+  tracker.close_depth_m = 2.5;
+  LocalMapper mapper(tracker, config, world.intrinsics);
+  const auto view = world.view(Se3());
+  KeyframeRecord record = FeatureWorld::record(view, 1, {});
+  record.depth_m[0] = 0;
+  mapper.insert(record);
+  const auto near = std::count_if(record.depth_m.begin(), record.depth_m.end(), [](float z) { return z > 0 && z <= 2.5F; });
+  EXPECT_EQ(mapper.landmark_count(), static_cast<std::size_t>(near));
+}
+
+TEST_F(LocalMapperTest, RepeatedMeasurementsSharpenLandmarks) {
+  LocalMapper mapper(tracker, config, world.intrinsics);
+  mapper.insert(FeatureWorld::record(world.view(Se3(), 1.0, 0.02), 1, {}));
+  const double first = mean_error_m(snapshot_of(mapper));
+  for (KeyframeId id = 2; id <= 12; ++id) {
+    const auto view = world.view(shifted(0.02 * static_cast<double>(id)), 1.0, 0.02);
+    mapper.insert(FeatureWorld::record(view, id, landmarks_by_point(snapshot_of(mapper))));
+  }
+  const MapSnapshot s = snapshot_of(mapper);
+  EXPECT_LT(mean_error_m(s), 0.6 * first);
+}
+
+TEST_F(LocalMapperTest, ForgetsLandmarksThatAreNotSeenAgain) {
+  LocalMapper mapper(tracker, config, world.intrinsics);
+  const auto view = world.view(Se3());
+  mapper.insert(FeatureWorld::record(view, 1, {}));
+  // From the same place, none of the first keyframe's landmarks is matched any more: they were a mover's, say.
+  const std::size_t before = mapper.landmark_count();
+  for (KeyframeId id = 2; id <= 8; ++id) {
+    KeyframeRecord record = FeatureWorld::record(view, id, {});
+    std::fill(record.depth_m.begin(), record.depth_m.end(), 0.0F);
+    mapper.insert(record);
+  }
+  EXPECT_LT(mapper.landmark_count(), before / 10);
+}
+
+TEST_F(LocalMapperTest, IgnoresMatchesWithLandmarksItHasCulled) {
+  LocalMapper mapper(tracker, config, world.intrinsics);
+  mapper.insert(FeatureWorld::record(world.view(Se3()), 1, {}));
+  const std::vector<LandmarkId> unknown(world.points().size(), 999'999);
+  mapper.insert(FeatureWorld::record(world.view(shifted(0.05)), 2, unknown));
+  EXPECT_EQ(mapper.keyframe_count(), 2U);
+}
+
+TEST_F(LocalMapperTest, KeepsWithinItsBudgetsAndStillKnowsDroppedPoses) {
+  config.max_keyframes = 8;
+  config.local_keyframes = 4;
+  config.local_landmarks = 300;
+  config.recovery_keyframes = 5;
+  LocalMapper mapper(tracker, config, world.intrinsics);
+  std::vector<Se3> poses;
+  for (KeyframeId id = 1; id <= 30; ++id) {
+    poses.push_back(shifted(0.03 * static_cast<double>(id)));
+    mapper.insert(FeatureWorld::record(world.view(poses.back()), id, landmarks_by_point(snapshot_of(mapper))));
+    const MapSnapshot s = snapshot_of(mapper);
+    ASSERT_LE(mapper.keyframe_count(), 8U);
+    ASSERT_LE(s.landmarks.size(), 300U);
+    ASSERT_LE(s.keyframes.size(), 5U);
+    for (const SnapshotKeyframe& k : s.keyframes) {
+      ASSERT_TRUE(std::all_of(k.landmarks.begin(), k.landmarks.end(), [&](std::uint32_t l) { return l < s.landmarks.size(); }));
+    }
+  }
+  for (KeyframeId id = 1; id <= 30; ++id) {
+    const std::optional<Se3> pose = mapper.keyframe_pose(id);
+    ASSERT_TRUE(pose) << id;
+    EXPECT_LT((pose->inverse() * poses[id - 1]).log().norm(), 1e-9) << id;
+  }
+  EXPECT_FALSE(mapper.keyframe_pose(31));
+  EXPECT_FALSE(mapper.keyframe_pose(kNoKeyframe));
+}
+
+TEST_F(LocalMapperTest, ANewMapReplacesTheOldOneButKeepsItsPoses) {
+  LocalMapper mapper(tracker, config, world.intrinsics);
+  mapper.insert(FeatureWorld::record(world.view(shifted(0.5)), 1, {}));
+  const MapSnapshot old_map = snapshot_of(mapper);
+  KeyframeRecord record = FeatureWorld::record(world.view(Se3()), 2, {});
+  record.starts_map = true;
+  record.map_id = 2;
+  mapper.insert(record);
+  const MapSnapshot s = snapshot_of(mapper);
+  EXPECT_EQ(s.map_id, 2U);
+  EXPECT_EQ(mapper.keyframe_count(), 1U);
+  EXPECT_GT(s.landmarks.front().id, old_map.landmarks.back().id) << "an old landmark's id must not mean a new one";
+  ASSERT_TRUE(mapper.keyframe_pose(1));
+  EXPECT_LT((mapper.keyframe_pose(1)->inverse() * shifted(0.5)).log().norm(), 1e-9);
+}
+
+TEST_F(LocalMapperTest, SnapshotOfAnEmptyMapSaysSo) {
+  LocalMapper mapper(tracker, config, world.intrinsics);
+  const MapSnapshot s = snapshot_of(mapper);
+  EXPECT_EQ(s.version, 0U);
+  EXPECT_EQ(s.newest_keyframe, kNoKeyframe);
+  EXPECT_TRUE(s.landmarks.empty());
+  EXPECT_TRUE(s.keyframes.empty());
+}
+
+}  // namespace
+}  // namespace posed
