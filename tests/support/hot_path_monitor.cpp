@@ -1,0 +1,122 @@
+#include "tests/support/hot_path_monitor.h"
+
+#include <atomic>
+#include <cstddef>
+#include <cstring>
+
+#include <dlfcn.h>
+#include <poll.h>
+#include <pthread.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "core/thread.h"
+
+// glibc's allocator under its other names, so that ours can stand before it without asking dlsym, which allocates.
+extern "C" {
+void* __libc_malloc(std::size_t);                     // NOLINT(bugprone-reserved-identifier): glibc's names
+void* __libc_calloc(std::size_t, std::size_t);        // NOLINT(bugprone-reserved-identifier)
+void* __libc_realloc(void*, std::size_t);             // NOLINT(bugprone-reserved-identifier)
+void* __libc_memalign(std::size_t, std::size_t);      // NOLINT(bugprone-reserved-identifier)
+void __libc_free(void*);                              // NOLINT(bugprone-reserved-identifier)
+}
+
+namespace {
+
+std::atomic<const char*> watched_thread{nullptr};
+std::atomic<long> allocations{0};
+std::atomic<long> locks{0};
+std::atomic<long> blocking_calls{0};
+std::atomic<const void*> first_caller{nullptr};
+
+void count(std::atomic<long>& counter, const void* caller) {
+  const char* const watched = watched_thread.load(std::memory_order_acquire);
+  if (watched == nullptr || std::strcmp(watched, posed::current_thread_name()) != 0) {
+    return;
+  }
+  counter.fetch_add(1);
+  const void* none = nullptr;
+  first_caller.compare_exchange_strong(none, caller);
+}
+
+template <typename Function>
+Function next_symbol(const char* name) {
+  return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
+}
+
+}  // namespace
+
+namespace posed::test {
+
+void watch_hot_path(const char* thread_name) {
+  allocations = 0;
+  locks = 0;
+  blocking_calls = 0;
+  first_caller = nullptr;
+  watched_thread.store(thread_name, std::memory_order_release);
+}
+
+HotPathCounts hot_path_counts() {
+  watched_thread.store(nullptr, std::memory_order_release);
+  return {allocations.load(), locks.load(), blocking_calls.load(), first_caller.load()};
+}
+
+}  // namespace posed::test
+
+#define POSED_CALLER __builtin_return_address(0)
+
+// The C library's functions, with ours in front. Pointers to the originals are resolved at the first call of each.
+extern "C" {
+
+void* malloc(std::size_t size) {
+  count(allocations, POSED_CALLER);
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t n, std::size_t size) {
+  count(allocations, POSED_CALLER);
+  return __libc_calloc(n, size);
+}
+void* realloc(void* p, std::size_t size) {
+  count(allocations, POSED_CALLER);
+  return __libc_realloc(p, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  count(allocations, POSED_CALLER);
+  return __libc_memalign(alignment, size);
+}
+void* memalign(std::size_t alignment, std::size_t size) {
+  count(allocations, POSED_CALLER);
+  return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** p, std::size_t alignment, std::size_t size) {
+  count(allocations, POSED_CALLER);
+  *p = __libc_memalign(alignment, size);
+  return *p == nullptr ? 12 : 0;  // ENOMEM
+}
+void free(void* p) {
+  if (p != nullptr) {
+    count(allocations, POSED_CALLER);
+  }
+  __libc_free(p);
+}
+
+#define POSED_FORWARD(counter, result, name, parameters, arguments)             \
+  result name parameters {                                                      \
+    static const auto original = next_symbol<result(*) parameters>(#name);      \
+    count(counter, POSED_CALLER);                                               \
+    return original arguments;                                                  \
+  }
+
+POSED_FORWARD(locks, int, pthread_mutex_lock, (pthread_mutex_t * m), (m))
+POSED_FORWARD(locks, int, pthread_mutex_trylock, (pthread_mutex_t * m), (m))
+POSED_FORWARD(locks, int, pthread_rwlock_rdlock, (pthread_rwlock_t * l), (l))
+POSED_FORWARD(locks, int, pthread_rwlock_wrlock, (pthread_rwlock_t * l), (l))
+POSED_FORWARD(locks, int, pthread_cond_wait, (pthread_cond_t * c, pthread_mutex_t* m), (c, m))
+POSED_FORWARD(blocking_calls, int, nanosleep, (const timespec* t, timespec* left), (t, left))
+POSED_FORWARD(blocking_calls, int, clock_nanosleep, (clockid_t id, int flags, const timespec* t, timespec* left), (id, flags, t, left))
+POSED_FORWARD(blocking_calls, ssize_t, read, (int fd, void* p, std::size_t n), (fd, p, n))
+POSED_FORWARD(blocking_calls, ssize_t, write, (int fd, const void* p, std::size_t n), (fd, p, n))
+POSED_FORWARD(blocking_calls, int, poll, (pollfd * fds, nfds_t n, int timeout), (fds, n, timeout))
+POSED_FORWARD(blocking_calls, int, fsync, (int fd), (fd))
+
+}  // extern "C"

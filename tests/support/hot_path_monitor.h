@@ -1,0 +1,20 @@
+#pragma once
+
+namespace posed::test {
+
+/// What one thread did that a real-time thread must not do.
+struct HotPathCounts {
+  long allocations = 0;     ///< malloc and its kin, operator new among them, and free
+  long locks = 0;           ///< pthread mutexes, reader-writer locks, condition variables
+  long blocking_calls = 0;  ///< sleeps, reads, writes, polls, file synchronisation; not the futex that waits for the next frame
+  const void* first_caller = nullptr;  ///< where the first of them was called from, for addr2line
+};
+
+/// Counts from now on what threads named `thread_name` (core/thread.h) do. The program's own malloc, pthread_mutex_lock and so on stand
+/// before the C library's, so whatever any library does on that thread is seen. Linking this file is what installs them.
+void watch_hot_path(const char* thread_name);
+
+/// Stops counting and returns the counts.
+HotPathCounts hot_path_counts();
+
+}  // namespace posed::test

@@ -1,0 +1,202 @@
+#include "slam/tracker.h"
+
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "config/config_loader.h"
+#include "core/frame_pool.h"
+#include "core/rigid_alignment.h"
+#include "drivers/synthetic_camera.h"
+#include "slam/local_mapper.h"
+
+namespace posed {
+namespace {
+
+enum class Mapping {
+  AtOnce,  ///< lockstep: the mapper takes a keyframe in before the next frame
+  Never,   ///< the mapper is always behind: there is no room for a keyframe
+};
+
+/// Tracker and mapper taking turns over the synthetic world without people.
+class Rig {
+ public:
+  explicit Rig(std::int64_t seed = 1) {
+    SyntheticConfig synthetic;
+    synthetic.people = 0;
+    synthetic.seed = seed;
+    const Result<Config> defaults = default_config();
+    config_ = defaults.value();
+    camera_ = std::move(SyntheticCamera::create(synthetic, config_.intrinsics).value());
+    pool_.emplace(config_.intrinsics.width, config_.intrinsics.height, 1);
+    tracker_.emplace(config_.tracker, config_.mapper, config_.intrinsics, Se3());
+    mapper_.emplace(config_.tracker, config_.mapper, config_.intrinsics);
+  }
+
+  /// Frame `index` of the world, changed by `spoil`.
+  template <typename Spoil>
+  PoseEstimate track(std::uint64_t index, Spoil spoil, Mapping mapping = Mapping::AtOnce) {
+    FrameWriter frame = *pool_->acquire();
+    EXPECT_TRUE(camera_->render(index, *frame));
+    spoil(*frame);
+    const PoseEstimate estimate = tracker_->track(*frame, snapshot_, mapping == Mapping::Never ? nullptr : &record_);
+    if (estimate.keyframe) {
+      mapper_->insert(record_);
+      mapper_->write_snapshot(snapshot_);
+    }
+    return estimate;
+  }
+  PoseEstimate track(std::uint64_t index, Mapping mapping = Mapping::AtOnce) {
+    return track(index, [](RgbdFrame&) {}, mapping);
+  }
+
+  /// Distance [m] between the estimate and the truth, with the first camera as the map's frame.
+  double error_m(std::uint64_t index, const PoseEstimate& estimate) const {
+    const Se3 truth = camera_->pose(0).inverse() * camera_->pose(index);
+    return (estimate.T_map_camera().translation() - truth.translation()).norm();
+  }
+
+  const LocalMapper& mapper() const { return *mapper_; }
+
+ private:
+  Config config_;
+  std::unique_ptr<SyntheticCamera> camera_;
+  std::optional<FramePool> pool_;
+  std::optional<Tracker> tracker_;
+  std::optional<LocalMapper> mapper_;
+  MapSnapshot snapshot_;
+  KeyframeRecord record_;
+};
+
+void blacken(RgbdFrame& frame) {
+  for (int y = 0; y < frame.gray.height; ++y) {
+    std::fill_n(frame.gray.row(y), frame.gray.width, std::uint8_t{0});
+    std::fill_n(frame.depth_m.row(y), frame.depth_m.width, 0.0F);
+  }
+}
+
+void take_depth_away(RgbdFrame& frame) {
+  for (int y = 0; y < frame.depth_m.height; ++y) {
+    std::fill_n(frame.depth_m.row(y), frame.depth_m.width, 0.0F);
+  }
+}
+
+TEST(Tracker, FollowsTheCameraThroughTheRoom) {
+  Rig rig;
+  double squared = 0;
+  constexpr std::uint64_t kFrames = 90;
+  for (std::uint64_t i = 0; i < kFrames; ++i) {
+    const PoseEstimate estimate = rig.track(i);
+    ASSERT_TRUE(estimate.has_pose()) << "frame " << i << ": " << to_string(estimate.state);
+    squared += std::pow(rig.error_m(i, estimate), 2);
+    ASSERT_NE(estimate.reference_keyframe, kNoKeyframe);
+    const Se3 rebuilt = *rig.mapper().keyframe_pose(estimate.reference_keyframe) * estimate.T_reference_camera;
+    EXPECT_LT((rebuilt.inverse() * estimate.T_map_camera()).log().norm(), 1e-6);
+  }
+  EXPECT_LT(std::sqrt(squared / kFrames), 0.03);
+  EXPECT_GT(rig.mapper().keyframe_count(), 1U);
+}
+
+TEST(Tracker, StartsAtTheConfiguredPoseAndSaysHowSureItIs) {
+  const Result<Config> config = default_config();
+  ASSERT_TRUE(config);
+  Rig rig;
+  const PoseEstimate first = rig.track(0);
+  EXPECT_TRUE(first.keyframe);
+  EXPECT_EQ(first.T_map_camera().translation(), Eigen::Vector3d::Zero());
+  EXPECT_TRUE(first.covariance.isZero()) << "the first frame defines the map";
+  const PoseEstimate second = rig.track(1);
+  ASSERT_TRUE(second.has_pose());
+  EXPECT_GT(second.covariance.diagonal().minCoeff(), 0.0);
+  EXPECT_LT(second.covariance.diagonal().maxCoeff(), 1e-2);
+  EXPECT_LT((second.covariance - second.covariance.transpose()).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST(Tracker, GivesTheSameBitsTwice) {
+  Rig a;
+  Rig b;
+  for (std::uint64_t i = 0; i < 30; ++i) {
+    const PoseEstimate first = a.track(i);
+    const PoseEstimate second = b.track(i);
+    ASSERT_EQ(first.T_odom_camera.translation(), second.T_odom_camera.translation());
+    ASSERT_EQ(first.T_odom_camera.rotation().coeffs(), second.T_odom_camera.rotation().coeffs());
+    ASSERT_EQ(first.covariance, second.covariance);
+    ASSERT_EQ(first.inliers, second.inliers);
+  }
+}
+
+TEST(Tracker, IsLostInTheDarkAndFindsBack) {
+  Rig rig;
+  std::uint64_t i = 0;
+  for (; i < 60; ++i) {
+    ASSERT_TRUE(rig.track(i).has_pose()) << i;
+  }
+  ASSERT_GE(rig.mapper().keyframe_count(), 5U) << "a younger map would be begun anew";
+  for (const std::uint64_t covered_until = i + 15; i < covered_until; ++i) {
+    const PoseEstimate estimate = rig.track(i, blacken);
+    EXPECT_EQ(estimate.state, TrackingState::Lost);
+    EXPECT_FALSE(estimate.has_pose());
+    EXPECT_FALSE(estimate.keyframe);
+    EXPECT_EQ(estimate.inliers, 0);
+  }
+  bool found = false;
+  for (const std::uint64_t deadline = i + 15; i < deadline && !found; ++i) {
+    const PoseEstimate estimate = rig.track(i);
+    found = estimate.has_pose();
+    if (found) {
+      EXPECT_LT(rig.error_m(i, estimate), 0.05);
+      EXPECT_EQ(estimate.map_id, 1U);
+    }
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST(Tracker, WaitsForDepthBeforeItBegins) {
+  Rig rig;
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    const PoseEstimate estimate = rig.track(i, take_depth_away);
+    EXPECT_EQ(estimate.state, TrackingState::Initializing);
+    EXPECT_FALSE(estimate.keyframe);
+  }
+  EXPECT_TRUE(rig.track(3).keyframe);
+}
+
+TEST(Tracker, TracksAFewFramesWithoutDepth) {
+  Rig rig;
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    const PoseEstimate estimate = i % 4 == 3 ? rig.track(i, take_depth_away) : rig.track(i);
+    ASSERT_TRUE(estimate.has_pose()) << i;
+    EXPECT_LT(rig.error_m(i, estimate), 0.05);
+  }
+}
+
+TEST(Tracker, DoesNotBeginWithoutRoomForTheKeyframe) {
+  Rig rig;
+  EXPECT_EQ(rig.track(0, Mapping::Never).state, TrackingState::Initializing);
+  EXPECT_EQ(rig.track(1).state, TrackingState::Tracking);
+}
+
+TEST(Tracker, GoesOnWithoutKeyframesWhileTheMapperIsBehind) {
+  Rig rig;
+  ASSERT_TRUE(rig.track(0).keyframe);
+  for (std::uint64_t i = 1; i < 15; ++i) {
+    const PoseEstimate estimate = rig.track(i, Mapping::Never);
+    EXPECT_TRUE(estimate.has_pose()) << i;
+    EXPECT_FALSE(estimate.keyframe);
+  }
+}
+
+TEST(Tracker, BeginsANewMapWhenAYoungOneIsLost) {
+  Rig rig;
+  ASSERT_TRUE(rig.track(0).has_pose());
+  EXPECT_EQ(rig.track(1, blacken).state, TrackingState::Initializing);
+  const PoseEstimate again = rig.track(2);
+  EXPECT_TRUE(again.has_pose());
+  EXPECT_EQ(again.map_id, 2U);
+  EXPECT_TRUE(rig.track(3).has_pose());
+}
+
+}  // namespace
+}  // namespace posed
