@@ -242,6 +242,8 @@ TEST_F(ConfigLoader, DuplicatesAndSyntaxErrors) {
             "posed.toml:3:1: not valid TOML: cannot redefine existing table 'tracker' (in a table header)");
   EXPECT_EQ(error_of("[tracker]\nfeatures = \n"),
             "posed.toml:2:12: not valid TOML: expected value, saw '\\n' (in a key-value pair)");
+  EXPECT_EQ(error_of("[%tracker]\n"),
+            "posed.toml:1:2: not valid TOML: expected bare key starting character or string delimiter, saw '%' (in a key)");
   EXPECT_THAT(error_of("[tracker\n"), StartsWith("posed.toml:1:9: not valid TOML: "));
   EXPECT_THAT(error_of("tracker.features = 1_000_000_000_000_000_000_000"), StartsWith("posed.toml:1:"));
 }
