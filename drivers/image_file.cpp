@@ -179,6 +179,13 @@ Status ImageDecoder::decode_color_png(std::span<const std::uint8_t> file, ImageV
   return {};
 }
 
+tl::unexpected<Error> ImageDecoder::jpeg_failure() {
+  const auto failure = bad_image(fmt::format("truncated or corrupt JPEG ({})", tjGetErrorStr2(jpeg_.get())));
+  // A decompressor that gave up within a header goes on reading there, so the next file needs a new one.
+  jpeg_.reset(tjInitDecompress());
+  return failure;
+}
+
 Result<ImageHeader> ImageDecoder::jpeg_header(std::span<const std::uint8_t> file) {
   int width = 0;
   int height = 0;
@@ -186,7 +193,7 @@ Result<ImageHeader> ImageDecoder::jpeg_header(std::span<const std::uint8_t> file
   int color_space = 0;
   if (jpeg_ == nullptr || tjDecompressHeader3(jpeg_.get(), file.data(), static_cast<unsigned long>(file.size()), &width, &height,
                                               &subsampling, &color_space) != 0) {
-    return bad_image(fmt::format("truncated or corrupt JPEG ({})", tjGetErrorStr2(jpeg_.get())));
+    return jpeg_failure();
   }
   ImageHeader header{"JPEG", width, height, 8, 3, "colour"};
   if (color_space == TJCS_GRAY) {
@@ -213,7 +220,7 @@ Status ImageDecoder::decode_color_jpeg(std::span<const std::uint8_t> file, Image
   constexpr int kFlags = TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS;
   if (tjDecompress2(jpeg_.get(), file.data(), static_cast<unsigned long>(file.size()), bgr.data, bgr.width,
                     static_cast<int>(bgr.stride), bgr.height, TJPF_BGR, kFlags) != 0) {
-    return bad_image(fmt::format("truncated or corrupt JPEG ({})", tjGetErrorStr2(jpeg_.get())));
+    return jpeg_failure();
   }
   gray_from_bgr(bgr, gray);
   return {};

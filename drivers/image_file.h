@@ -50,6 +50,7 @@ class ImageDecoder {
   Status decode_color_png(std::span<const std::uint8_t> file, ImageView<std::uint8_t> bgr, ImageView<std::uint8_t> gray);
   Status decode_color_jpeg(std::span<const std::uint8_t> file, ImageView<std::uint8_t> bgr, ImageView<std::uint8_t> gray);
   Result<ImageHeader> jpeg_header(std::span<const std::uint8_t> file);
+  tl::unexpected<Error> jpeg_failure();
 
   struct DestroyJpeg {
     void operator()(void* handle) const noexcept;

@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <cstdlib>
 #include <iterator>
-#include <queue>
-#include <string_view>
 #include <system_error>
-#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -21,101 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr TimeNs kPeriodOfSingleFrameNs = kNsPerSecond / 30;
-
-/// Both lists merged by stamp as a doubly linked list. The two closest entries of different kinds that remain are always neighbours
-/// in it (stamps are unique within a list, so whatever stood between them would be closer to one of them), which makes the greedy
-/// choice over all pairs a walk along neighbours.
-class GreedyPairing {
- public:
-  GreedyPairing(const std::vector<TumListEntry>& color, const std::vector<TumListEntry>& depth, std::int64_t max_difference_ns)
-      : max_difference_ns_(max_difference_ns) {
-    nodes_.reserve(color.size() + depth.size());
-    for (std::size_t c = 0, d = 0; c < color.size() || d < depth.size();) {
-      const bool take_color = d == depth.size() || (c < color.size() && color[c].stamp_ns <= depth[d].stamp_ns);
-      const int here = static_cast<int>(nodes_.size());
-      nodes_.push_back({take_color ? &color[c++] : &depth[d++], take_color, here - 1, here + 1});
-    }
-    if (!nodes_.empty()) {
-      nodes_.back().next = kNone;
-    }
-    for (int i = 0; i + 1 < static_cast<int>(nodes_.size()); ++i) {
-      consider(i, i + 1);
-    }
-  }
-
-  std::vector<TumAssociation> run() {
-    std::vector<TumAssociation> pairs;
-    while (!candidates_.empty()) {
-      const Candidate best = candidates_.top();
-      candidates_.pop();
-      if (node(best.color).paired || node(best.depth).paired) {
-        continue;
-      }
-      pairs.push_back({*node(best.color).entry, *node(best.depth).entry});
-      remove(best.color);
-      remove(best.depth);
-    }
-    std::sort(pairs.begin(), pairs.end(),
-              [](const TumAssociation& a, const TumAssociation& b) { return a.color.stamp_ns < b.color.stamp_ns; });
-    return pairs;
-  }
-
- private:
-  static constexpr int kNone = -1;
-
-  struct Node {
-    const TumListEntry* entry;
-    bool is_color;
-    int previous;
-    int next;
-    bool paired = false;
-  };
-  struct Candidate {
-    std::int64_t difference_ns;
-    std::int64_t color_stamp_ns;
-    std::int64_t depth_stamp_ns;
-    int color;
-    int depth;
-    bool operator>(const Candidate& other) const {
-      return std::tie(difference_ns, color_stamp_ns, depth_stamp_ns) >
-             std::tie(other.difference_ns, other.color_stamp_ns, other.depth_stamp_ns);
-    }
-  };
-
-  Node& node(int i) { return nodes_[static_cast<std::size_t>(i)]; }
-
-  void consider(int earlier, int later) {
-    if (node(earlier).is_color == node(later).is_color) {
-      return;
-    }
-    const std::int64_t difference_ns = node(later).entry->stamp_ns - node(earlier).entry->stamp_ns;
-    if (difference_ns <= max_difference_ns_) {
-      const int color = node(earlier).is_color ? earlier : later;
-      const int depth = node(earlier).is_color ? later : earlier;
-      candidates_.push({difference_ns, node(color).entry->stamp_ns, node(depth).entry->stamp_ns, color, depth});
-    }
-  }
-
-  /// Takes an entry out; its neighbours become neighbours of each other.
-  void remove(int i) {
-    node(i).paired = true;
-    const int previous = node(i).previous;
-    const int next = node(i).next;
-    if (previous != kNone) {
-      node(previous).next = next;
-    }
-    if (next != kNone) {
-      node(next).previous = previous;
-    }
-    if (previous != kNone && next != kNone) {
-      consider(previous, next);
-    }
-  }
-
-  std::int64_t max_difference_ns_;
-  std::vector<Node> nodes_;
-  std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> candidates_;
-};
 
 TimeNs median_interval(const std::vector<TumAssociation>& pairs) {
   std::vector<TimeNs> intervals;
@@ -212,7 +114,19 @@ Status load_associations(const fs::path& name, TumSequence& sequence) {
 
 std::vector<TumAssociation> pair_by_stamp(const std::vector<TumListEntry>& color, const std::vector<TumListEntry>& depth,
                                           std::int64_t max_difference_ns) {
-  return GreedyPairing(color, depth, max_difference_ns).run();
+  std::vector<TumAssociation> pairs;
+  auto nearest = depth.begin();
+  for (const TumListEntry& entry : color) {
+    const auto distance_ns = [&](auto candidate) { return std::abs(candidate->stamp_ns - entry.stamp_ns); };
+    // Both lists are ordered, so the nearest depth image never moves back.
+    while (nearest != depth.end() && std::next(nearest) != depth.end() && distance_ns(std::next(nearest)) < distance_ns(nearest)) {
+      ++nearest;
+    }
+    if (nearest != depth.end() && distance_ns(nearest) <= max_difference_ns) {
+      pairs.push_back({entry, *nearest});
+    }
+  }
+  return pairs;
 }
 
 Result<TumSequence> load_tum_sequence(const ReplayConfig& config) {

@@ -25,9 +25,10 @@ struct TumSequence {
   TimeNs period_ns = 0;               ///< median interval of colour stamps; 1/30 s where there is but one pair
 };
 
-/// Pairs each colour image with the depth image nearest in time, |difference| <= `max_difference_ns`, each depth image at most
-/// once: greedily by smallest difference over the whole recording, as TUM's own associate.py does, ties by earlier colour stamp.
-/// Both lists ordered by stamp, each stamp once. The pairs come ordered by colour stamp. O(n log n). Reentrant.
+/// Pairs each colour image with the depth image nearest in time, |difference| <= `max_difference_ns`; of two equally near ones the
+/// earlier. A depth image may serve two colour images: where both cameras run at one rate but their phases drift, giving each depth
+/// image away only once (as TUM's associate.py does) would leave out colour images that have good depth. Both lists ordered by
+/// stamp. The pairs come ordered by colour stamp. O(n). Reentrant.
 std::vector<TumAssociation> pair_by_stamp(const std::vector<TumListEntry>& color, const std::vector<TumListEntry>& depth,
                                           std::int64_t max_difference_ns);
 
