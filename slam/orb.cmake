@@ -26,3 +26,12 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
     target_compile_definitions(posed_kernels_${level} PRIVATE ${POSED_ORB_DEFINITIONS})
   endforeach()
 endif()
+
+# On demand; see its first lines.
+function(posed_orb_pattern_tool)
+  foreach(module core imgcodecs imgproc)
+    posed_find_opencv(${module})
+  endforeach()
+  add_executable(learn_orb_pattern EXCLUDE_FROM_ALL learn_orb_pattern.cpp)
+  target_link_libraries(learn_orb_pattern PRIVATE posed_slam OpenCV::imgcodecs OpenCV::imgproc OpenCV::core)
+endfunction()

