@@ -67,10 +67,12 @@ void flatten(const toml::table& table, const std::string& prefix, int depth, std
   }
 }
 
-/// Bytes of the UTF-8 sequence at the start of `text`, 0 where there is none. Source: the table of well-formed sequences, Unicode 15,
-/// section 3.9, table 3-7.
+/// Bytes of the UTF-8 sequence at the start of `text`, 0 where there is none. Source: the table of well-formed sequences, Unicode
+/// 15, section 3.9, table 3-7.
 std::size_t utf8_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned>(static_cast<unsigned char>(text[i])) : 0U; };
+  const auto byte = [&](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned>(static_cast<unsigned char>(text[i])) : 0U;
+  };
   const auto in = [](unsigned value, unsigned low, unsigned high) { return value >= low && value <= high; };
   const unsigned lead = byte(0);
   if (lead < 0x80) {

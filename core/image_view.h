@@ -16,10 +16,11 @@ struct ImageView {
   int channels = 1;           ///< interleaved elements a pixel
 
   T* row(int y) const noexcept { return data + y * stride; }
-  T& at(int x, int y) const noexcept { return data[y * stride + x * channels]; }
+  T& at(int x, int y) const noexcept { return data[y * stride + static_cast<std::ptrdiff_t>(x) * channels]; }
   bool empty() const noexcept { return data == nullptr; }
   bool contains(int x, int y) const noexcept { return x >= 0 && y >= 0 && x < width && y < height; }
 
+  // NOLINTNEXTLINE(google-explicit-constructor): reading asks for less than writing, as with a pointer to const
   operator ImageView<const T>() const noexcept requires(!std::is_const_v<T>) { return {data, width, height, stride, channels}; }
 };
 

@@ -40,7 +40,7 @@ void LatencyHistogram::record(TimeNs duration_ns) noexcept {
 }
 
 LatencySummary LatencyHistogram::summary() const noexcept {
-  std::array<std::uint64_t, kBuckets> counts;
+  std::array<std::uint64_t, kBuckets> counts{};
   std::uint64_t total = 0;
   for (std::size_t i = 0; i < kBuckets; ++i) {
     counts[i] = counts_[i].load(std::memory_order_acquire);

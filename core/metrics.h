@@ -32,7 +32,7 @@ struct LatencySummary {
 
 /// Durations in logarithmic buckets, each octave split in 32: a quantile (the smallest recorded value that is not below its share
 /// of all) is at most 1/32 = 3.2 % too high and never too low, and the maximum is exact. Durations of 2^42 ns (73 minutes) and more
-/// share the last bucket; a quantile that falls there is the maximum. Negative durations count as 0. `record` is wait-free but for
+/// share one bucket; a quantile that falls there is the maximum. Negative durations count as 0. `record` is wait-free but for
 /// the maximum (lock-free) and does not allocate. Thread-safe; a summary taken during recording or reset may miss the newest
 /// values, and its mean may then be off by them.
 class LatencyHistogram {
@@ -44,7 +44,7 @@ class LatencyHistogram {
  private:
   static constexpr int kSubBucketBits = 5;
   static constexpr int kRangeBits = 42;  // 2^42 ns = 73 min
-  static constexpr std::size_t kBuckets = static_cast<std::size_t>(kRangeBits - kSubBucketBits + 1) << kSubBucketBits;
+  static constexpr std::size_t kBuckets = (static_cast<std::size_t>(kRangeBits - kSubBucketBits + 1) << kSubBucketBits) + 1;
 
   static std::size_t bucket_of(std::uint64_t ns) noexcept;
   static std::uint64_t upper_bound_ns(std::size_t bucket) noexcept;

@@ -19,7 +19,7 @@ constexpr int kPatchRadius = 15;
 
 /// Taps of the Gaussian (sigma 2) that smooths the image before the descriptor's tests; they add up to 256.
 constexpr int kBlurTaps = 7;
-constexpr std::uint16_t kBlurWeights[kBlurTaps] = {18, 33, 49, 56, 49, 33, 18};
+constexpr std::uint16_t kBlurWeights[kBlurTaps] = {18, 34, 48, 56, 48, 34, 18};
 
 /// Where the columns of a downsized row come from: out[x] lies between source[x] and source[x] + 1.
 struct ResizeColumns {

@@ -1,5 +1,5 @@
-// Any bytes, read as a configuration and as a camera calibration: they are accepted or refused with a message, and what is accepted can be
-// written and read again.
+// Any bytes, read as a configuration and as a camera calibration: they are accepted or refused with a message, and what is accepted
+// can be written and read again.
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>

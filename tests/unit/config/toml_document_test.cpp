@@ -76,12 +76,12 @@ TEST(TomlDocument, ReportsSyntaxErrorsWithPosition) {
 
 TEST(TomlDocument, FindsBytesThatAreNotUtf8) {
   const std::pair<std::string, TextPosition> cases[] = {
-      {"a = 1\n\xFF\n", {2, 1}},                          // never in UTF-8
-      {"a = '\xC3\xA9\xE2\x82\xAC\x80'\n", {1, 8}},      // a continuation byte alone, after two whole characters
-      {"a = '\xE2\x82'\n", {1, 6}},                        // cut short
-      {"a = '\xC0\x80'\n", {1, 6}},                        // overlong
-      {"a = '\xED\xA0\x80'\n", {1, 6}},                    // half of a surrogate pair
-      {"a = '\xF4\x90\x80\x80'\n", {1, 6}},                // beyond U+10FFFF
+      {"a = 1\n\xFF\n", {2, 1}},                              // never in UTF-8
+      {"a = '\xC3\xA9\xE2\x82\xAC\x80'\n", {1, 8}},           // a continuation byte alone, after two whole characters
+      {"a = '\xE2\x82'\n", {1, 6}},                           // cut short
+      {"a = '\xC0\x80'\n", {1, 6}},                           // overlong
+      {"a = '\xED\xA0\x80'\n", {1, 6}},                       // half of a surrogate pair
+      {"a = '\xF4\x90\x80\x80'\n", {1, 6}},                   // beyond U+10FFFF
       {std::string(100, '\n') + "# \xF0\x9F\x98", {101, 3}},  // cut short by the end
   };
   for (const auto& [text, position] : cases) {

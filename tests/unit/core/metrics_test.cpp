@@ -84,7 +84,7 @@ TEST(LatencyHistogram, QuantilesAreValuesThatWereRecordedNotInterpolated) {
 }
 
 TEST(LatencyHistogram, KeepsItsPromiseAtEveryEdgeOfEveryBucket) {
-  // The bucket of an octave [2^k, 2^(k+1)) begin at multiples of 2^(k-5); one below and the edge itself fall in different buckets.
+  // The buckets of an octave [2^k, 2^(k+1)) begin at multiples of 2^(k-5); one below and the edge itself fall in different buckets.
   for (int k = 0; k < 42; ++k) {
     const TimeNs octave = TimeNs{1} << k;
     const TimeNs step = std::max<TimeNs>(octave / 32, 1);

@@ -1,0 +1,11 @@
+# Tests of the ORB extractor. OpenCV's modules are references to compare with.
+foreach(module features2d imgproc imgcodecs core)
+  posed_find_opencv(${module})
+endforeach()
+set(POSED_ORB_TEST_LIBRARIES posed_slam OpenCV::features2d OpenCV::imgproc OpenCV::core)
+
+posed_test(orb_test
+  SOURCES hamming_test.cpp orb_extractor_test.cpp orb_kernels_test.cpp orb_matching_test.cpp orb_stages_test.cpp
+  LIBRARIES ${POSED_ORB_TEST_LIBRARIES})
+# Replaces the global operator new, hence a program of its own.
+posed_test(orb_allocation_test SOURCES allocation_counter.cpp orb_allocation_test.cpp LIBRARIES ${POSED_ORB_TEST_LIBRARIES})

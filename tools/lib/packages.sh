@@ -1,0 +1,40 @@
+# shellcheck shell=bash disable=SC2034  # the lists are read by the scripts that source this file
+# The Debian 12 packages of the project, in one place, as "package|purpose". docs/dependencies.md tells more of each;
+# tools/lib/check_packages.sh holds the two equal.
+
+posed_build_packages=(
+  "g++|C++20 compiler"
+  "cmake|build system"
+  "ninja-build|build system"
+  "pkg-config|finds libraries"
+  "libopencv-core-dev|image type and universal intrinsics (SIMD)"
+  "libeigen3-dev|linear algebra"
+  "libspng-dev|PNG decoding and encoding"
+  "libturbojpeg0-dev|JPEG decoding"
+  "liblcm-dev|LCM, the message transport"
+  "liblcm-bin|lcm-gen, the message compiler"
+  "libexpected-dev|tl::expected, errors as values"
+  "libspdlog-dev|logging"
+  "libfmt-dev|text formatting"
+  "libtomlplusplus-dev|TOML configuration files"
+  "libcli11-dev|command lines"
+  "libsystemd-dev|event loop and service notification"
+  "nlohmann-json3-dev|JSON statistics"
+)
+
+posed_demo_packages=(
+  "iproute2|ip, to look for a multicast route"
+)
+
+posed_test_packages=(
+  "libgtest-dev|unit tests"
+  "libgmock-dev|matchers and mocks"
+  "librapidcheck-dev|property tests"
+  "libbenchmark-dev|benchmarks"
+  "libopencv-imgproc-dev|reference image operations in tests"
+  "libopencv-features2d-dev|reference ORB in tests and benchmarks"
+  "libopencv-imgcodecs-dev|reference image files in tests"
+  "python3|reports and reference computations of tests"
+  "python3-numpy|reference computations of tests"
+  "iproute2|network namespaces for the message tests"
+)
