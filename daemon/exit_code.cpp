@@ -26,7 +26,8 @@ std::string_view exit_code_table() noexcept {
          "  64  the command line is wrong\n"
          "  65  a file or device delivered something malformed\n"
          "  66  a sequence, file or device does not exist\n"
-         "  69  a device or the system cannot serve now, or this build was made without it\n"
+         "  69  a device or the system cannot serve now, or this build was made without it;\n"
+         "      with --exit-at-end also: the source failed\n"
          "  70  an error inside the program: please report it\n"
          "  74  the operating system refused to read, write or open\n"
          "  78  the configuration is wrong; nothing was touched";

@@ -82,14 +82,14 @@ TEST_F(SupervisorTest, OutlivesTheSourceOtherwise) {
   // The signal comes from a poll after the one that saw the end, so the end alone did not stop the run.
   struct LateSignal final : public App {
     FakeApp& app;
-    int polls = 0;
+    mutable int polls = 0;
     explicit LateSignal(FakeApp& wrapped) : app(wrapped) {}
     const SourceInfo& source_info() const override { return app.source_info(); }
     Status start() override { return app.start(); }
     bool wait_finished(TimeNs timeout_ns) override { return app.wait_finished(timeout_ns); }
     void stop() override { app.stop(); }
     HealthReport health() const override {
-      if (++const_cast<LateSignal*>(this)->polls == 5) {
+      if (++polls == 5) {
         kill(getpid(), SIGTERM);
       }
       return app.health();
