@@ -12,8 +12,10 @@ namespace {
 constexpr float kNear_m = 0.05F;
 /// Neighbouring faces overlap by this, so that rounding leaves no slit between them.
 constexpr float kSeam_m = 1e-4F;
-/// Most samples along the long axis of a pixel's footprint on a plane seen at a slant.
-constexpr float kMaxProbes = 4;
+/// Samples along the longer axis of a pixel's footprint on a plane seen at a slant, and the ratio of the axes from which they are
+/// taken.
+constexpr float kMaxProbes = 2;
+constexpr float kProbesFrom = 1.4F;
 
 /// Image bounds of a convex polygon in the camera frame; false where it lies behind the camera.
 bool project_bounds(const std::array<Eigen::Vector3f, 4>& corners, const CameraView& camera, PixelBox& bounds) {
@@ -136,36 +138,33 @@ ViewedQuad::Overlap ViewedQuad::overlap(const PixelBox& tile) const {
   return full ? Overlap::Full : Overlap::Partial;
 }
 
-PackedBgr ViewedQuad::colour(float x, float y) const {
+PackedBgr ViewedQuad::colour(float x, float y, float pixel) const {
   const float z = 1.0F / inverse_z(x, y);
   const float u = u_by_z(x, y) * z;
   const float v = v_by_z(x, y) * z;
   // The pixel's footprint on the texture: the images of one step in x and of one in y (Heckbert, "Survey of texture mapping",
   // 1986).
-  const Eigen::Vector2f step_x((u_by_z.a - u * inverse_z.a) * z, (v_by_z.a - v * inverse_z.a) * z);
-  const Eigen::Vector2f step_y((u_by_z.b - u * inverse_z.b) * z, (v_by_z.b - v * inverse_z.b) * z);
-  const bool x_is_longer = step_x.squaredNorm() > step_y.squaredNorm();
-  const Eigen::Vector2f& longer = x_is_longer ? step_x : step_y;
-  const float length = std::max(longer.norm(), 1e-6F);
-  const float width = std::abs(step_x.x() * step_y.y() - step_x.y() * step_y.x()) / length;
-  const float probes = std::clamp(std::ceil(length / std::max(width, 1e-6F) - 0.25F), 1.0F, kMaxProbes);
-  const float footprint = std::max(width, length / probes);
-  const float u_clamped = std::clamp(u, u_min, u_max);
-  const float v_clamped = std::clamp(v, v_min, v_max);
-  if (probes == 1.0F) {
-    return scaled(texture->sample(u_clamped, v_clamped, footprint), brightness_q8);
+  const float scale = z * pixel;
+  const float ux = (u_by_z.a - u * inverse_z.a) * scale;
+  const float vx = (v_by_z.a - v * inverse_z.a) * scale;
+  const float uy = (u_by_z.b - u * inverse_z.b) * scale;
+  const float vy = (v_by_z.b - v * inverse_z.b) * scale;
+  const float x_square = ux * ux + vx * vx;
+  const float y_square = uy * uy + vy * vy;
+  const float length = std::sqrt(std::max({x_square, y_square, 1e-12F}));
+  const float width = std::abs(ux * vy - uy * vx) / length;
+  if (length < kProbesFrom * width || pixel < 1.0F) {
+    const float footprint = std::max(width, length / kMaxProbes);
+    return scaled(texture->sample(std::clamp(u, u_min, u_max), std::clamp(v, v_min, v_max), footprint), brightness_q8);
   }
-  std::uint32_t even = 0;
-  std::uint32_t odd = 0;
-  const Eigen::Vector2f step = longer / probes;
-  Eigen::Vector2f at = Eigen::Vector2f(u, v) - longer * (0.5F - 0.5F / probes);
-  for (float i = 0; i < probes; i += 1.0F, at += step) {
-    const PackedBgr c = texture->sample(std::clamp(at.x(), u_min, u_max), std::clamp(at.y(), v_min, v_max), footprint);
-    even += c & 0x00ff00ffU;
-    odd += c >> 8 & 0xffU;
-  }
-  const auto share = static_cast<std::uint32_t>(static_cast<float>(brightness_q8) / probes);
-  return ((even & 0xffffU) * share >> 8) | ((even >> 16) * share >> 8) << 16 | (odd * share >> 8) << 8;
+  // Seen at a slant: two samples along the longer axis, each as wide as half of it.
+  const float du = 0.25F * (x_square > y_square ? ux : uy);
+  const float dv = 0.25F * (x_square > y_square ? vx : vy);
+  const float footprint = std::max(width, length / kMaxProbes);
+  const PackedBgr one = texture->sample(std::clamp(u - du, u_min, u_max), std::clamp(v - dv, v_min, v_max), footprint);
+  const PackedBgr two = texture->sample(std::clamp(u + du, u_min, u_max), std::clamp(v + dv, v_min, v_max), footprint);
+  const PackedBgr mean = ((one & 0x00fefefeU) >> 1) + ((two & 0x00fefefeU) >> 1) + (one & two & 0x00010101U);
+  return scaled(mean, brightness_q8);
 }
 
 bool ViewedPart::view(const BodyPart& part, const MipTexture& texture, const CameraView& camera, const PixelBox& image,
@@ -228,7 +227,7 @@ float ViewedPart::meet(float x, float y) const {
   return nearest < INFINITY ? nearest : 0.0F;
 }
 
-PackedBgr ViewedPart::colour(float x, float y, float z) const {
+PackedBgr ViewedPart::colour(float x, float y, float z, float pixel) const {
   const Eigen::Vector3f d = direction(x, y);
   const Eigen::Vector3f p = origin + z * d;
   const float rho = std::max(std::sqrt(p.x() * p.x() + p.y() * p.y()), 1e-6F);
@@ -248,7 +247,7 @@ PackedBgr ViewedPart::colour(float x, float y, float z) const {
   const float u = std::clamp(u_m, 0.0F, texture->width_m()) * texture->texels_per_m_u();
   const float v = std::clamp(v_m, 0.0F, texture->height_m()) * texture->texels_per_m_v();
   const float brightness = diffuse_brightness(R_world_part * unsqueezed);
-  return scaled(texture->sample(u, v, texels_per_pixel * z / facing), static_cast<std::uint32_t>(brightness * 256.0F));
+  return scaled(texture->sample(u, v, texels_per_pixel * pixel * z / facing), static_cast<std::uint32_t>(brightness * 256.0F));
 }
 
 }  // namespace posed

@@ -62,7 +62,8 @@ struct ViewedQuad {
   enum class Overlap { None, Partial, Full };
   Overlap overlap(const PixelBox& tile) const;
 
-  PackedBgr colour(float x, float y) const;
+  /// Colour averaged over a square of side `pixel` [pixels] around (x, y).
+  PackedBgr colour(float x, float y, float pixel) const;
 };
 
 /// A rounded cone (convex hull of two spheres), in coordinates in which its squeeze is undone.
@@ -87,7 +88,7 @@ struct ViewedPart {
   float meet(float x, float y) const;
 
   /// Colour at depth `z`, as `meet` returned it.
-  PackedBgr colour(float x, float y, float z) const;
+  PackedBgr colour(float x, float y, float z, float pixel) const;
 };
 
 /// Multiplies the three channels by k_q8 / 256, k_q8 <= 256.

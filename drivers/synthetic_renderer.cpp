@@ -10,6 +10,7 @@ namespace {
 
 /// Where the four rays of a silhouette's pixel go, relative to its centre: a rotated grid, so that edges of any slope get all
 /// steps.
+constexpr float kSubPixelSize = 0.5F;
 constexpr std::array<std::array<float, 2>, 4> kSubPixel{
     {{-0.125F, -0.375F}, {0.375F, -0.125F}, {0.125F, 0.375F}, {-0.375F, 0.125F}}};
 
@@ -174,9 +175,9 @@ void SyntheticRenderer::cast_row(const Tile& tile, std::size_t offset, float* in
   }
 }
 
-PackedBgr SyntheticRenderer::colour_of(std::int32_t object, float x, float y, float z) const {
+PackedBgr SyntheticRenderer::colour_of(std::int32_t object, float x, float y, float z, float pixel) const {
   const auto index = static_cast<std::size_t>(object);
-  return index < quads_.size() ? quads_[index].colour(x, y) : parts_[index - quads_.size()].colour(x, y, z);
+  return index < quads_.size() ? quads_[index].colour(x, y, pixel) : parts_[index - quads_.size()].colour(x, y, z, pixel);
 }
 
 void SyntheticRenderer::cast_tile(const Tile& tile, int x0, int y0, ImageView<PackedBgr> colour, ImageView<float> depth_m,
@@ -192,7 +193,7 @@ void SyntheticRenderer::cast_tile(const Tile& tile, int x0, int y0, ImageView<Pa
       const bool met = object[i] != kNothing;
       const float z = met ? 1.0F / inverse_z[pixel] : 0.0F;
       depth_m.at(x0 + i, y) = z;
-      colour.at(x0 + i, y) = met ? colour_of(object[i], ideal_x_[offset + pixel], ideal_y_[offset + pixel], z) : 0;
+      colour.at(x0 + i, y) = met ? colour_of(object[i], ideal_x_[offset + pixel], ideal_y_[offset + pixel], z, 1.0F) : 0;
       if (!person_mask.empty()) {
         person_mask.at(x0 + i, y) = met && object[i] >= static_cast<std::int32_t>(quads_.size()) ? 255 : 0;
       }
@@ -227,7 +228,7 @@ PackedBgr SyntheticRenderer::cast(const Tile& tile, float x, float y) const {
       }
     }
   }
-  return object == kNothing ? 0 : colour_of(object, x, y, 1.0F / nearest);
+  return object == kNothing ? 0 : colour_of(object, x, y, 1.0F / nearest, kSubPixelSize);
 }
 
 void SyntheticRenderer::smooth_silhouettes(ImageView<PackedBgr> colour) const {

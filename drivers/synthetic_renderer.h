@@ -45,7 +45,7 @@ class SyntheticRenderer {
   void cast_row(const Tile& tile, std::size_t offset, float* inverse_z, std::int32_t* object) const;
   void smooth_silhouettes(ImageView<PackedBgr> colour) const;
   PackedBgr cast(const Tile& tile, float x, float y) const;
-  PackedBgr colour_of(std::int32_t object, float x, float y, float z) const;
+  PackedBgr colour_of(std::int32_t object, float x, float y, float z, float pixel) const;
 
   const SyntheticWorld& world_;
   CameraIntrinsics camera_;

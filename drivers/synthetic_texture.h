@@ -32,17 +32,22 @@ class MipTexture {
   float texels_per_m_u() const { return static_cast<float>(levels_[0].width) / width_m_; }
   float texels_per_m_v() const { return static_cast<float>(levels_[0].height) / height_m_; }
 
-  /// Trilinear sample at (u, v), in texels of level 0 (0 is the outer edge of the first texel); outside, the border goes on.
-  /// `footprint` is the side of the pixel on the texture, in texels of level 0.
+  /// Sample at (u, v), in texels of level 0 (0 is the outer edge of the first texel); bilinear within a level and blended between
+  /// two; outside, the border goes on. `footprint` is the side of the pixel on the texture, in texels of level 0.
   PackedBgr sample(float u, float v, float footprint) const {
     const float level = std::clamp(coarse_log2(footprint), 0.0F, static_cast<float>(kLevels - 1));
     const int lower = static_cast<int>(level);
-    const auto weight = static_cast<std::uint64_t>((level - static_cast<float>(lower)) * 256.0F);
+    // Near a level one sample serves: the blend between two levels takes the middle half of the way.
+    const float blend = std::clamp(2.0F * (level - static_cast<float>(lower)) - 0.5F, 0.0F, 1.0F);
+    if (blend == 1.0F) {
+      return joined(bilinear(levels_[static_cast<std::size_t>(lower) + 1], u, v));
+    }
+    const auto weight = static_cast<std::uint64_t>(blend * 256.0F);
     std::uint64_t colour = bilinear(levels_[static_cast<std::size_t>(lower)], u, v);
     if (weight != 0) {
       colour = lerp(colour, bilinear(levels_[static_cast<std::size_t>(lower) + 1], u, v), weight);
     }
-    return static_cast<PackedBgr>(colour | (colour >> 24));
+    return joined(colour);
   }
 
  private:
@@ -57,6 +62,7 @@ class MipTexture {
   static std::uint64_t spread(PackedBgr c) {
     return (c & 0x00ff00ffU) | (static_cast<std::uint64_t>((c >> 8) & 0x00ff00ffU) << 32);
   }
+  static PackedBgr joined(std::uint64_t lanes) { return static_cast<PackedBgr>(lanes | (lanes >> 24)); }
   static std::uint64_t lerp(std::uint64_t a, std::uint64_t b, std::uint64_t weight_b) {
     constexpr std::uint64_t kHalf = 0x0080008000800080U;
     return ((a * (256 - weight_b) + b * weight_b + kHalf) >> 8) & 0x00ff00ff00ff00ffU;
