@@ -205,8 +205,9 @@ void add_source_options(CLI::App& command, ReplaySource& source) {
   CLI::Option* lockstep =
       command.add_flag("--lockstep", source.lockstep, "As fast as possible, every frame, nothing dropped; repeatable bit by bit");
   command
-      .add_flag("--realtime",
-                "At the pace of the stamps, as on a robot: frames are dropped where the machine is too slow (the default)")
+      .add_flag_callback(
+          "--realtime", [&source] { source.lockstep = false; },
+          "At the pace of the stamps, as on a robot: frames are dropped where the machine is too slow (the default)")
       ->excludes(lockstep);
   const std::map<std::string, SyntheticMode> modes{{"sitting", SyntheticMode::Sitting}, {"walking", SyntheticMode::Walking}};
   command.add_option("--seed", source.seed, "Synthetic: the world's seed")->excludes(sequence);
