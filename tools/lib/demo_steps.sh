@@ -68,7 +68,7 @@ show_live() {
     fail "step 'Live' failed" "Full output: $folder/posed.log and $folder/watch.log" "By hand: $bin/daemon/posed --config $folder/posed.toml"
   published=$(from_report 'poses published \([0-9]*\)' '\1')
   columns+=(live)
-  title[live]="live"
+  title[live]="live, 30 Hz"
   received[live]="$(tail -n +2 "$folder/received.csv" | wc -l) of ${published:-0}"
   tracked[live]=$(from_report 'frames tracked \([0-9]*\), lost \([0-9]*\), not processed \([0-9]*\)' '\1 \2 \3' |
     awk '{ printf "%d of %d", $1, $1 + $2 + $3 }')
@@ -101,9 +101,17 @@ show_replay() {
   track_ms[$column]=$(quantiles "$folder/stats.json" track_ms)
   if [ -e "$truth" ]; then
     run_step "Compare with the true trajectory: ${title[$column]}" "demo-$column-eval.log" "By hand: $posectl eval $truth $folder/trajectory.txt" \
-      "$posectl" eval "$truth" "$folder/trajectory.txt" --json "$folder/error.json"
+      "$posectl" eval "$truth" "$folder/trajectory.txt" --frames "${truth%/*}/rgb.txt" --json "$folder/error.json"
     ate[$column]=$(json_number "$folder/error.json" ate_rmse | awk '{ printf "%.4f", $1 }')
   fi
+}
+
+# show_synthetic_replay: another walk through the synthetic room, written as a recording with its true trajectory, and replayed.
+show_synthetic_replay() {
+  local recording=$results/recording
+  run_step "Write $replay_seconds s of the synthetic room as a recording" demo-synth.log "By hand: $posectl synth --help" \
+    "$posectl" synth --out "$recording" --force --seed 2 --mode walking --people 2 --duration "$replay_seconds" --camera config/cameras/synthetic.toml
+  show_replay synthetic "synthetic" "$recording/groundtruth.txt" --sequence "$recording" --camera "$recording/camera.toml"
 }
 
 # print_row NAME VALUES: a line of the table; VALUES is the name of an array.
