@@ -26,8 +26,9 @@ struct ImageHeader {
 /// PNG depth. Strict, because a half-decoded image looks like a scene: data that ends early, a wrong checksum, a size that is not
 /// the views', a wrong bit depth or number of channels are errors, and the views' pixels are then unspecified. JPEG carries no
 /// checksum, so flipped bits that still decode pass unseen. Headers are judged before anything is allocated, so a hostile file
-/// costs at most its own size and one image. Buffers are kept from call to call; what the libraries allocate a frame is below 100
-/// kB, but for progressive JPEG.
+/// costs at most its own size and one image. Pixel buffers are kept from call to call; the libraries allocate their row buffers and
+/// inflate state a frame (progressive JPEG: the whole image's coefficients). Of a PNG, only the checksum of the end chunk, after
+/// the last pixel, is not asked for.
 ///
 /// Reentrant: one decoder serves one thread at a time. Messages name what was found and what was expected; those of the `read_`
 /// functions begin with the path. Errors: BadData; from the `read_` functions also NotFound and Io.

@@ -71,7 +71,8 @@ void ReplayDecoder::run(std::stop_token stop) {
       finish(*item, CaptureKind::EndOfStream, {});
     } else if (item != nullptr) {
       finish(*item, CaptureKind::Failed,
-             {ErrorCode::BadData, fmt::format("{}: not one of {} frames can be read", sequence_.folder.string(), sequence_.pairs.size())});
+             {ErrorCode::BadData,
+              fmt::format("{}: not one of {} frames can be read", sequence_.folder.string(), sequence_.pairs.size())});
     }
   } catch (const std::exception& exception) {
     if (ReplayItem* item = ring_.claim()) {
