@@ -6,6 +6,8 @@
 
 namespace posed {
 
+// Learnt by learn_orb_pattern.cpp from 120 frames, every second of the first 240, of the recording freiburg1_xyz of the TUM RGB-D
+// benchmark (CC BY 4.0).
 const std::array<BriefTest, kBriefTests> kBriefPattern = {{
 #include "slam/orb_pattern_table.inc"
 }};

@@ -21,7 +21,8 @@ extern const std::array<BriefTest, kBriefTests> kBriefPattern;
 /// The pattern turned to each of a number of orientations, as pixel offsets for one row stride. Reentrant.
 class RotatedPattern {
  public:
-  /// 5.6 degrees apart; no finer division measured better matches.
+  /// 5.6 degrees apart. Of 2,961 correct matches between frames of a recording, half as many orientations lose 121 and twice as
+  /// many (a table of 128 KiB) gain 47.
   static constexpr int kOrientations = 64;
 
   explicit RotatedPattern(std::ptrdiff_t stride);

@@ -20,6 +20,9 @@ using cv::vx_setall_u8;
 using cv::vx_setzero_s16;
 using cv::vx_setzero_u8;
 
+// A sign mask has a bit for each lane; that of 32 lanes comes sign-extended.
+constexpr std::uint64_t kLaneBits = ~std::uint64_t{0} >> (64 - v_uint8::nlanes);
+
 inline v_int16 signed_16(const v_uint16& v) {
   return cv::v_reinterpret_as_s16(v);
 }
@@ -155,10 +158,7 @@ int suppress_non_maxima(const std::uint8_t* above, const std::uint8_t* scores, c
                                      cv::v_max(vx_load(above + x + 1), vx_load(scores + x - 1)));
     const v_uint8 after = cv::v_max(cv::v_max(vx_load(below + x - 1), vx_load(below + x)),
                                     cv::v_max(vx_load(below + x + 1), vx_load(scores + x + 1)));
-    auto mask = static_cast<std::uint64_t>(cv::v_signmask((score > before) & (score >= after)));
-    if (v_uint8::nlanes < 64) {
-      mask &= (std::uint64_t{1} << (v_uint8::nlanes % 64)) - 1;
-    }
+    std::uint64_t mask = static_cast<std::uint64_t>(cv::v_signmask((score > before) & (score >= after))) & kLaneBits;
     if (end - x < v_uint8::nlanes) {
       mask &= (std::uint64_t{1} << (end - x)) - 1;
     }
@@ -227,12 +227,19 @@ void moments(const std::uint8_t* centre, std::ptrdiff_t stride, int* m10, int* m
   *m01 = cv::v_reduce_sum(sum_01);
 }
 
+// Fetches the pixels one by one, since gathering is slower, and compares them by vectors.
 void describe(const std::uint8_t* centre, const std::int16_t* offsets, std::uint64_t* words) {
+  alignas(64) std::uint8_t a[64];
+  alignas(64) std::uint8_t b[64];
   for (int word = 0; word < 4; ++word) {
-    std::uint64_t bits = 0;
     for (int i = 0; i < 64; ++i) {
-      const std::uint64_t less = centre[offsets[2 * i]] < centre[offsets[2 * i + 1]] ? 1 : 0;
-      bits |= less << i;
+      a[i] = centre[offsets[2 * i]];
+      b[i] = centre[offsets[2 * i + 1]];
+    }
+    std::uint64_t bits = 0;
+    for (int i = 0; i < 64; i += v_uint8::nlanes) {
+      const auto mask = cv::v_signmask(vx_load(a + i) < vx_load(b + i));
+      bits |= (static_cast<std::uint64_t>(mask) & kLaneBits) << i;
     }
     words[word] = bits;
     offsets += 128;

@@ -114,7 +114,6 @@ TEST_P(OrbMatchingTest, TurnedAndScaledImagesMatchAboutAsWellAsWithOpenCvsDescri
   const MatchQuality opencv = match(with_opencv_descriptors(image, ours_from), with_opencv_descriptors(warped, ours_to), truth);
   RecordProperty("ours", std::to_string(ours.correct) + " of " + std::to_string(ours.matches));
   RecordProperty("opencv", std::to_string(opencv.correct) + " of " + std::to_string(opencv.matches));
-  printf("%d %d  %d %d\n", ours.correct, ours.matches, opencv.correct, opencv.matches);
   EXPECT_GT(ours.correct, 250);
   EXPECT_GE(ours.precision(), opencv.precision() - 0.02);
   EXPECT_GE(ours.correct, opencv.correct * 9 / 10);

@@ -1,0 +1,11 @@
+# cmake -DNM=... -DOBJECTS=... -P check_kernel_symbols.cmake: fails if an object defines a function or a weak symbol that others can see.
+if(NOT OBJECTS)
+  message(FATAL_ERROR "no objects to check")
+endif()
+foreach(object IN LISTS OBJECTS)
+  execute_process(COMMAND ${NM} -C --defined-only "${object}" OUTPUT_VARIABLE symbols COMMAND_ERROR_IS_FATAL ANY)
+  string(REGEX MATCHALL "[^\n]* [TWVui] [^\n]*" shared "${symbols}")
+  if(shared)
+    message(FATAL_ERROR "${object} defines: ${shared}")
+  endif()
+endforeach()
