@@ -72,6 +72,9 @@ show_live() {
   received[live]="$(tail -n +2 "$folder/received.csv" | wc -l) of ${published:-0}"
   tracked[live]=$(from_report 'frames tracked \([0-9]*\), lost \([0-9]*\), not processed \([0-9]*\)' '\1 \2 \3' |
     awk '{ printf "%d of %d", $1, $1 + $2 + $3 }')
+  if [ "${tracked[live]##* }" -lt $((live_seconds * 29)) ]; then
+    echo "    This machine was too busy to render every frame in time: ${tracked[live]##* } of $((live_seconds * 30)). A real camera does not need it to."
+  fi
   track_ms[live]=$(from_report '; track p50 \([0-9.]*\) ms p99 \([0-9.]*\) ms' '\1 / \2')
   latency_ms[live]=$(from_report 'capture to publish p50 \([0-9.]*\) ms p99 \([0-9.]*\) ms' '\1 / \2')
   echo "    posed published ${published:-0} poses; received by the other process: ${received[live]}"
