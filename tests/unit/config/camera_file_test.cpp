@@ -7,7 +7,7 @@
 #include "config/config_loader.h"
 #include "config/config_reference.h"
 #include "core/pinhole_camera.h"
-#include "tests/unit/config/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace posed {
 namespace {

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/unit/config/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace posed {
 namespace {

@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 
 #include "drivers/image_writer.h"
-#include "test_recording.h"
+#include "tests/support/test_recording.h"
 
 namespace posed {
 namespace {

@@ -7,7 +7,7 @@
 #include <sys/resource.h>
 
 #include "drivers/file_io.h"
-#include "test_recording.h"
+#include "tests/support/test_recording.h"
 
 namespace posed {
 namespace {

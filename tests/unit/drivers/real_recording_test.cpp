@@ -1,28 +1,20 @@
-#include <cstdlib>
-
 #include <gtest/gtest.h>
 
 #include "drivers/replay_source.h"
-#include "test_recording.h"
+#include "tests/support/recordings.h"
 
 namespace posed {
 namespace {
 
-std::filesystem::path recording_folder() {
-  const char* data = std::getenv("POSED_TEST_DATA");
-  const std::filesystem::path folder =
-      data != nullptr ? std::filesystem::path(data) : std::filesystem::path(POSED_SOURCE_DIR) / "../shared/data";
-  return folder / "tum_fr1_xyz";
-}
-
 TEST(RealRecording, EveryFrameOfFreiburg1XyzIsDelivered) {
-  if (!std::filesystem::exists(recording_folder() / "rgb.txt")) {
-    GTEST_SKIP() << "needs the recording tum_fr1_xyz; looked for " << recording_folder() << " (set POSED_TEST_DATA)";
+  const std::filesystem::path folder = recording_folder("tum_fr1_xyz");
+  if (!std::filesystem::exists(folder / "rgb.txt")) {
+    GTEST_SKIP() << "needs the recording tum_fr1_xyz; looked for " << folder << " (set POSED_TEST_DATA)";
   }
   SourceConfig config;
   config.kind = SourceKind::Replay;
   config.pacing = Pacing::Lockstep;
-  config.replay.sequence = recording_folder().string();
+  config.replay.sequence = folder.string();
   Result<std::unique_ptr<RgbdSource>> source = make_rgbd_source(config, CameraIntrinsics{}, SystemClock::instance());
   ASSERT_TRUE(source) << source.error().message;
   const std::uint64_t total = (*source)->info().total_frames;

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/image_writer.h"
-#include "test_recording.h"
+#include "tests/support/test_recording.h"
 
 namespace posed {
 namespace {

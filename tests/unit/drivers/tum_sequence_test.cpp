@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "test_recording.h"
+#include "tests/support/test_recording.h"
 
 namespace posed {
 namespace {

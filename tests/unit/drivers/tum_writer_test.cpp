@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/tum_sequence.h"
-#include "test_recording.h"
+#include "tests/support/test_recording.h"
 
 namespace posed {
 namespace {

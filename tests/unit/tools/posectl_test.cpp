@@ -15,7 +15,7 @@
 
 #include "core/clock.h"
 #include "daemon/message_conversion.h"
-#include "tests/unit/tools/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/posectl/exit_code.h"
 #include "tools/posectl/trajectory.h"
 

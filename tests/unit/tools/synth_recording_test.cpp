@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "config/config_loader.h"
-#include "tests/unit/tools/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/posectl/trajectory.h"
 
 namespace posed {

@@ -16,7 +16,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "tests/unit/tools/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace posed {
 namespace {

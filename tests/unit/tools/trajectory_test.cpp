@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/unit/tools/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace posed {
 namespace {

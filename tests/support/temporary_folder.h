@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -8,19 +9,17 @@
 #include <string_view>
 #include <system_error>
 
-#include <gtest/gtest.h>
-
 namespace posed {
 
-/// A folder of its own for a test, removed with it.
+/// A folder of its own for a test, removed with everything in it when the test ends.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "posectl_test_XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) {
-      ADD_FAILURE() << "cannot make a temporary folder " << name;
+    std::string pattern = (std::filesystem::temp_directory_path() / "posed_test_XXXXXX").string();
+    if (::mkdtemp(pattern.data()) == nullptr) {
+      throw std::system_error(errno, std::generic_category(), pattern);
     }
-    path_ = name;
+    path_ = pattern;
   }
   ~TemporaryFolder() {
     std::error_code ignored;
@@ -32,10 +31,12 @@ class TemporaryFolder {
   const std::filesystem::path& path() const { return path_; }
   std::string operator/(std::string_view name) const { return (path_ / name).string(); }
 
-  /// Writes a file and returns its path.
-  std::string write(std::string_view name, std::string_view contents) const {
-    std::ofstream(path_ / name, std::ios::binary) << contents;
-    return *this / name;
+  /// Writes a file below the folder, whose parent folders are made, and gives its path.
+  std::filesystem::path write(const std::filesystem::path& name, std::string_view text) const {
+    const std::filesystem::path file = path_ / name;
+    std::filesystem::create_directories(file.parent_path());
+    std::ofstream(file, std::ios::binary) << text;
+    return file;
   }
 
  private:
