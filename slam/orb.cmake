@@ -27,8 +27,11 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
   endforeach()
 endif()
 
-# On demand; see its first lines.
+# On demand; see its first lines. It reads image files with OpenCV, whose packages for that only the tests install.
 function(posed_orb_pattern_tool)
+  if(NOT POSED_TESTS)
+    return()
+  endif()
   foreach(module core imgcodecs imgproc)
     posed_find_opencv(${module})
   endforeach()

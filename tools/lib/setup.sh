@@ -53,7 +53,7 @@ show_progress() {
     sleep "${2:-20}" >/dev/null 2>&1 &
     nap=$!
     wait "$nap"
-    printf '    ... %s\n' "$(tail -n 1 "$1" | cut -c 1-110)"
+    printf '    ... %s\n' "$(tail -n 1 "$1" | cut -c 1-130)"
   done
 }
 
