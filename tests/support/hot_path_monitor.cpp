@@ -2,9 +2,12 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
+#include <iterator>
 
 #include <dlfcn.h>
+#include <execinfo.h>
 #include <poll.h>
 #include <pthread.h>
 #include <time.h>
@@ -27,16 +30,18 @@ std::atomic<const char*> watched_thread{nullptr};
 std::atomic<long> allocations{0};
 std::atomic<long> locks{0};
 std::atomic<long> blocking_calls{0};
-std::atomic<const void*> first_caller{nullptr};
+std::atomic<int> first_depth{0};
+void* first_stack[32];
 
-void count(std::atomic<long>& counter, const void* caller) {
+void count(std::atomic<long>& counter) {
   const char* const watched = watched_thread.load(std::memory_order_acquire);
   if (watched == nullptr || std::strcmp(watched, posed::current_thread_name()) != 0) {
     return;
   }
   counter.fetch_add(1);
-  const void* none = nullptr;
-  first_caller.compare_exchange_strong(none, caller);
+  if (int none = 0; first_depth.compare_exchange_strong(none, -1)) {
+    first_depth = backtrace(first_stack, std::size(first_stack));
+  }
 }
 
 template <typename Function>
@@ -52,50 +57,58 @@ void watch_hot_path(const char* thread_name) {
   allocations = 0;
   locks = 0;
   blocking_calls = 0;
-  first_caller = nullptr;
+  first_depth = 0;
+  backtrace(first_stack, std::size(first_stack));  // its first call loads a library, which allocates
   watched_thread.store(thread_name, std::memory_order_release);
 }
 
 HotPathCounts hot_path_counts() {
   watched_thread.store(nullptr, std::memory_order_release);
-  return {allocations.load(), locks.load(), blocking_calls.load(), first_caller.load()};
+  HotPathCounts counts{allocations.load(), locks.load(), blocking_calls.load(), {}};
+  const int depth = first_depth.load();
+  if (depth > 0) {
+    char** const lines = backtrace_symbols(first_stack, depth);
+    for (int i = 0; i < depth; ++i) {
+      counts.first_stack += std::string(lines[i]) + "\n";
+    }
+    std::free(lines);
+  }
+  return counts;
 }
 
 }  // namespace posed::test
-
-#define POSED_CALLER __builtin_return_address(0)
 
 // The C library's functions, with ours in front. Pointers to the originals are resolved at the first call of each.
 extern "C" {
 
 void* malloc(std::size_t size) {
-  count(allocations, POSED_CALLER);
+  count(allocations);
   return __libc_malloc(size);
 }
 void* calloc(std::size_t n, std::size_t size) {
-  count(allocations, POSED_CALLER);
+  count(allocations);
   return __libc_calloc(n, size);
 }
 void* realloc(void* p, std::size_t size) {
-  count(allocations, POSED_CALLER);
+  count(allocations);
   return __libc_realloc(p, size);
 }
 void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  count(allocations, POSED_CALLER);
+  count(allocations);
   return __libc_memalign(alignment, size);
 }
 void* memalign(std::size_t alignment, std::size_t size) {
-  count(allocations, POSED_CALLER);
+  count(allocations);
   return __libc_memalign(alignment, size);
 }
 int posix_memalign(void** p, std::size_t alignment, std::size_t size) {
-  count(allocations, POSED_CALLER);
+  count(allocations);
   *p = __libc_memalign(alignment, size);
   return *p == nullptr ? 12 : 0;  // ENOMEM
 }
 void free(void* p) {
   if (p != nullptr) {
-    count(allocations, POSED_CALLER);
+    count(allocations);
   }
   __libc_free(p);
 }
@@ -103,7 +116,7 @@ void free(void* p) {
 #define POSED_FORWARD(counter, result, name, parameters, arguments)             \
   result name parameters {                                                      \
     static const auto original = next_symbol<result(*) parameters>(#name);      \
-    count(counter, POSED_CALLER);                                               \
+    count(counter);                                               \
     return original arguments;                                                  \
   }
 

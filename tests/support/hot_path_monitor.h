@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 namespace posed::test {
 
 /// What one thread did that a real-time thread must not do.
@@ -7,7 +9,7 @@ struct HotPathCounts {
   long allocations = 0;     ///< malloc and its kin, operator new among them, and free
   long locks = 0;           ///< pthread mutexes, reader-writer locks, condition variables
   long blocking_calls = 0;  ///< sleeps, reads, writes, polls, file synchronisation; not the futex that waits for the next frame
-  const void* first_caller = nullptr;  ///< where the first of them was called from, for addr2line
+  std::string first_stack;  ///< where the first of them was called from: module(+offset) a line, for addr2line
 };
 
 /// Counts from now on what threads named `thread_name` (core/thread.h) do. The program's own malloc, pthread_mutex_lock and so on stand

@@ -2,7 +2,7 @@
 #include <mutex>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
+#include <time.h>
 
 #include "config/config_loader.h"
 #include "core/thread.h"
@@ -19,7 +19,8 @@ TEST(HotPathMonitor, SeesAllocationsLocksAndBlockingCalls) {
       void* volatile p = std::malloc(100);
       std::free(p);
       const std::lock_guard lock(mutex);
-      usleep(1);
+      const timespec moment{0, 1000};
+      nanosleep(&moment, nullptr);
     });
     thread.join();
   };
@@ -33,7 +34,7 @@ TEST(HotPathMonitor, SeesAllocationsLocksAndBlockingCalls) {
   EXPECT_GE(counts.allocations, 2);
   EXPECT_GE(counts.locks, 1);
   EXPECT_GE(counts.blocking_calls, 1);
-  EXPECT_NE(counts.first_caller, nullptr);
+  EXPECT_FALSE(counts.first_stack.empty());
 }
 
 /// The daemon's own pipeline, in real time, with people walking through the picture.
@@ -65,9 +66,9 @@ TEST(HotPath, TrackingThreadNeitherAllocatesNorLocksNorBlocks) {
 
   ASSERT_GT(with_pose, 30U) << "too little was tracked to show anything";
   ASSERT_GT(keyframes, 0U) << "handing a keyframe on is part of what is tested";
-  EXPECT_EQ(counts.allocations, 0) << "first called from " << counts.first_caller;
-  EXPECT_EQ(counts.locks, 0) << "first called from " << counts.first_caller;
-  EXPECT_EQ(counts.blocking_calls, 0) << "first called from " << counts.first_caller;
+  EXPECT_EQ(counts.allocations, 0) << "first called from\n" << counts.first_stack;
+  EXPECT_EQ(counts.locks, 0) << "first called from\n" << counts.first_stack;
+  EXPECT_EQ(counts.blocking_calls, 0) << "first called from\n" << counts.first_stack;
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include <posed/status_t.hpp>
 
 #include "core/thread.h"
+#include "tests/unit/daemon/fake_transport.h"
 #include "tests/unit/daemon/fakes.h"
 
 namespace posed {

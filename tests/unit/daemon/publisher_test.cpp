@@ -9,6 +9,7 @@
 #include <posed/pose_t.hpp>
 #include <posed/status_t.hpp>
 
+#include "tests/unit/daemon/fake_transport.h"
 #include "tests/unit/daemon/fakes.h"
 
 namespace posed {

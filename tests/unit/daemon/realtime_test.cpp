@@ -17,6 +17,7 @@
 
 #include "core/thread.h"
 #include "daemon/pipeline.h"
+#include "tests/unit/daemon/fake_transport.h"
 #include "tests/unit/daemon/fakes.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
