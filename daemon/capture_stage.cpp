@@ -21,15 +21,20 @@ bool CaptureStage::next(const std::stop_token& stop, FrameRef& frame) {
   switch (capture.kind) {
     case CaptureKind::Frame:
       captured_.add();
+      count_missed(capture.frame->sequence);
       frame = std::move(capture.frame);
       return true;
     case CaptureKind::SkippedFrame:
       skipped_.add();
+      ++explained_gap_;
       if (on_error_) {
         on_error_(capture.error);
       }
       return true;
-    case CaptureKind::NoFreeSlot: no_slot_.add(); return true;
+    case CaptureKind::NoFreeSlot:
+      no_slot_.add();
+      ++explained_gap_;
+      return true;
     case CaptureKind::EndOfStream: ended_.store(true, std::memory_order_relaxed); return false;
     case CaptureKind::Stopped: return false;
     case CaptureKind::Failed: fail(capture.error); return false;
@@ -57,8 +62,17 @@ void CaptureStage::report(HealthReport& health) const {
   health.source_ended = ended_.load(std::memory_order_relaxed);
   health.frames_captured = captured_.value();
   health.frames_skipped = skipped_.value();
+  health.frames_missed = missed_.value();
   health.frames_no_slot = no_slot_.value();
   health.frames_dropped = dropped_.value();
+}
+
+void CaptureStage::count_missed(std::uint64_t sequence) {
+  if (sequence > next_sequence_ + explained_gap_) {
+    missed_.add(sequence - next_sequence_ - explained_gap_);
+  }
+  next_sequence_ = sequence + 1;
+  explained_gap_ = 0;
 }
 
 void CaptureStage::fail(const Error& error) {

@@ -33,6 +33,7 @@ class CaptureStage {
 
  private:
   void fail(const Error& error);
+  void count_missed(std::uint64_t sequence);
 
   RgbdSource& source_;
   FramePool& pool_;
@@ -42,6 +43,9 @@ class CaptureStage {
   Counter skipped_;
   Counter no_slot_;
   Counter dropped_;
+  Counter missed_;
+  std::uint64_t next_sequence_ = 0;
+  std::uint64_t explained_gap_ = 0;  // frames since the last delivered one that were skipped or had no slot
   std::atomic<bool> failed_{false};
   std::atomic<bool> ended_{false};
 };

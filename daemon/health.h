@@ -16,6 +16,7 @@ struct HealthReport {
 
   std::uint64_t frames_captured = 0;  ///< frames that reached the pool
   std::uint64_t frames_skipped = 0;   ///< bad frames of the source, left out
+  std::uint64_t frames_missed = 0;    ///< gaps in the source's count that nothing else explains: lost before it, or it was too slow
   std::uint64_t frames_no_slot = 0;   ///< lost because the frame pool was exhausted
   std::uint64_t frames_dropped = 0;   ///< handed back by the full queue before the tracker
   std::uint64_t frames_tracked = 0;   ///< with a pose

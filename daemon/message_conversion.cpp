@@ -118,6 +118,7 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.source_ended = health.source_ended ? 1 : 0;
   message.frames_captured = count(health.frames_captured);
   message.frames_skipped = count(health.frames_skipped);
+  message.frames_missed = count(health.frames_missed);
   message.frames_no_slot = count(health.frames_no_slot);
   message.frames_dropped = count(health.frames_dropped);
   message.frames_tracked = count(health.frames_tracked);

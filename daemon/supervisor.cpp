@@ -167,7 +167,8 @@ void Supervisor::log_health(const HealthReport& health) {
 }
 
 std::string describe(const HealthReport& health, double rate_hz) {
-  const std::uint64_t lost_before_tracker = health.frames_skipped + health.frames_no_slot + health.frames_dropped;
+  const std::uint64_t lost_before_tracker =
+      health.frames_missed + health.frames_skipped + health.frames_no_slot + health.frames_dropped;
   std::string line = fmt::format(
       "{}{}, {:.1f} frames/s; frames tracked {}, lost {}, not processed {}; poses published {}, dropped {}, errors {}; track p50 "
       "{:.1f} ms p99 "

@@ -1,6 +1,8 @@
 #include "tests/support/hot_path_monitor.h"
 
+#include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
@@ -26,7 +28,9 @@ void __libc_free(void*);                              // NOLINT(bugprone-reserve
 
 namespace {
 
-std::atomic<const char*> watched_thread{nullptr};
+constexpr std::size_t kMaxWatched = 4;
+const char* watched_threads[kMaxWatched];
+std::atomic<std::size_t> watched_count{0};  // published after the names are written
 std::atomic<long> allocations{0};
 std::atomic<long> locks{0};
 std::atomic<long> blocking_calls{0};
@@ -34,8 +38,8 @@ std::atomic<int> first_depth{0};
 void* first_stack[32];
 
 void count(std::atomic<long>& counter) {
-  const char* const watched = watched_thread.load(std::memory_order_acquire);
-  if (watched == nullptr || std::strcmp(watched, posed::current_thread_name()) != 0) {
+  const char* const* const end = watched_threads + watched_count.load(std::memory_order_acquire);
+  if (std::none_of(watched_threads + 0, end, [](const char* name) { return std::strcmp(name, posed::current_thread_name()) == 0; })) {
     return;
   }
   counter.fetch_add(1);
@@ -53,17 +57,19 @@ Function next_symbol(const char* name) {
 
 namespace posed::test {
 
-void watch_hot_path(const char* thread_name) {
+void watch_hot_path(std::initializer_list<const char*> thread_names) {
+  assert(thread_names.size() <= kMaxWatched);
   allocations = 0;
   locks = 0;
   blocking_calls = 0;
   first_depth = 0;
   backtrace(first_stack, std::size(first_stack));  // its first call loads a library, which allocates
-  watched_thread.store(thread_name, std::memory_order_release);
+  std::copy(thread_names.begin(), thread_names.end(), watched_threads);
+  watched_count.store(thread_names.size(), std::memory_order_release);
 }
 
 HotPathCounts hot_path_counts() {
-  watched_thread.store(nullptr, std::memory_order_release);
+  watched_count.store(0, std::memory_order_release);
   HotPathCounts counts{allocations.load(), locks.load(), blocking_calls.load(), {}};
   const int depth = first_depth.load();
   if (depth > 0) {

@@ -24,11 +24,11 @@ TEST(HotPathMonitor, SeesAllocationsLocksAndBlockingCalls) {
     });
     thread.join();
   };
-  test::watch_hot_path("watched");
+  test::watch_hot_path({"watched"});
   misbehave("another");
   test::HotPathCounts counts = test::hot_path_counts();
   EXPECT_EQ(counts.allocations + counts.locks, 0);
-  test::watch_hot_path("watched");
+  test::watch_hot_path({"watched"});
   misbehave("watched");
   counts = test::hot_path_counts();
   EXPECT_GE(counts.allocations, 2);
@@ -53,7 +53,7 @@ TEST(HotPath, TrackingThreadNeitherAllocatesNorLocksNorBlocks) {
   test::HotPathCounts counts;
   options.on_estimate = [&](const PoseEstimate& estimate) {  // on the publisher's thread
     if (++estimates == kWarmUpFrames) {
-      test::watch_hot_path("tracker");
+      test::watch_hot_path({"tracker"});
     } else if (estimates == kLastFrame) {
       counts = test::hot_path_counts();
     } else if (estimates > kWarmUpFrames && estimates < kLastFrame) {

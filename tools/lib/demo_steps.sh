@@ -53,7 +53,7 @@ from_report() { grep 'poses published' "$results/live/posed.log" | tail -n 1 | s
 
 # show_live: the daemon in real time, and a second process that receives.
 show_live() {
-  local network=() folder=$results/live published
+  local network=() folder=$results/live published not_processed
   say "Live: posed on the synthetic camera, 30 frames a second for $live_seconds s; posectl watch receives in another process"
   mkdir -p "$folder"
   rm -f "$folder"/*
@@ -72,8 +72,9 @@ show_live() {
   received[live]="$(tail -n +2 "$folder/received.csv" | wc -l) of ${published:-0}"
   tracked[live]=$(from_report 'frames tracked \([0-9]*\), lost \([0-9]*\), not processed \([0-9]*\)' '\1 \2 \3' |
     awk '{ printf "%d of %d", $1, $1 + $2 + $3 }')
-  if [ "${tracked[live]##* }" -lt $((live_seconds * 29)) ]; then
-    echo "    This machine was too busy to render every frame in time: ${tracked[live]##* } of $((live_seconds * 30)). A real camera does not need it to."
+  not_processed=$(from_report 'not processed \([0-9]*\)' '\1')
+  if [ "${not_processed:-0}" -gt 0 ]; then
+    echo "    This machine was too busy for $not_processed of the frames: it renders them as well, which a real camera does for itself."
   fi
   track_ms[live]=$(from_report '; track p50 \([0-9.]*\) ms p99 \([0-9.]*\) ms' '\1 / \2')
   latency_ms[live]=$(from_report 'capture to publish p50 \([0-9.]*\) ms p99 \([0-9.]*\) ms' '\1 / \2')
@@ -109,12 +110,12 @@ show_replay() {
   fi
 }
 
-# show_synthetic_replay: another walk through the synthetic room, written as a recording with its true trajectory, and replayed.
+# show_synthetic_replay COLUMN TITLE PEOPLE: a way through the synthetic room, written as a recording with its true trajectory, and replayed.
 show_synthetic_replay() {
-  local recording=$results/recording
-  run_step "Write $replay_seconds s of the synthetic room as a recording" demo-synth.log "By hand: $posectl synth --help" \
-    "$posectl" synth --out "$recording" --force --seed 2 --mode walking --people 2 --duration "$replay_seconds" --camera config/cameras/synthetic.toml
-  show_replay synthetic "synthetic" "$recording/groundtruth.txt" --sequence "$recording" --camera "$recording/camera.toml"
+  local recording=$results/recording-$1
+  run_step "Write $replay_seconds s of the synthetic room, $2, as a recording" "demo-synth-$1.log" "By hand: $posectl synth --help" \
+    "$posectl" synth --out "$recording" --force --seed 2 --mode walking --people "$3" --duration "$replay_seconds" --camera config/cameras/synthetic.toml
+  show_replay "$1" "$2" "$recording/groundtruth.txt" --sequence "$recording" --camera "$recording/camera.toml"
 }
 
 # print_row NAME VALUES: a line of the table; VALUES is the name of an array.
@@ -137,4 +138,5 @@ print_table() {
   print_row "tracking p50 / p99 [ms]" track_ms
   print_row "capture to publish p50 / p99 [ms]" latency_ms
   echo
+  echo "  People who walk through the picture pull the estimate with them: taking them out of it is not built yet (README.md)."
 }

@@ -24,11 +24,11 @@ std::string latency_line(std::string_view name, const LatencySummary& summary) {
 }  // namespace
 
 std::uint64_t frames_delivered(const HealthReport& health) {
-  return health.frames_captured + health.frames_no_slot;
+  return health.frames_captured + health.frames_no_slot + health.frames_missed;
 }
 
 std::uint64_t frames_dropped(const HealthReport& health) {
-  return health.frames_dropped + health.frames_no_slot;
+  return health.frames_dropped + health.frames_no_slot + health.frames_missed;
 }
 
 std::string to_json(const ReplayStats& stats) {

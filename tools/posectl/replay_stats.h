@@ -18,10 +18,10 @@ struct ReplayStats {
   HealthReport health;
 };
 
-/// Frames that reached the pipeline: processed, dropped on the way, or lost because the pool was full. Reentrant.
+/// Frames that the source counted: processed, dropped on the way, missed, or lost because the pool was full. Reentrant.
 std::uint64_t frames_delivered(const HealthReport& health);
 
-/// Frames that the tracker never saw: pushed out of its queue, or lost because the pool was full. Reentrant.
+/// Frames that the tracker never saw: pushed out of its queue, missed by the source, or lost because the pool was full. Reentrant.
 std::uint64_t frames_dropped(const HealthReport& health);
 
 /// One JSON object; docs/posectl.md describes its keys. Reentrant.

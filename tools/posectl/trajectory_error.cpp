@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/clock.h"
+#include "core/rigid_alignment.h"
 
 namespace posed {
 namespace {
@@ -78,17 +79,13 @@ std::vector<PosePair> pair_by_stamp(const Trajectory& truth, const Trajectory& e
 }
 
 Se3 align_positions(const std::vector<PosePair>& pairs) {
-  assert(!pairs.empty());
-  const auto count = static_cast<Eigen::Index>(pairs.size());
-  Eigen::Matrix3Xd estimated(3, count);
-  Eigen::Matrix3Xd actual(3, count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const PosePair& pair = pairs[static_cast<std::size_t>(i)];
-    estimated.col(i) = pair.estimate.T_world_camera.translation();
-    actual.col(i) = pair.truth.T_world_camera.translation();
+  std::vector<Eigen::Vector3d> estimated;
+  std::vector<Eigen::Vector3d> actual;
+  for (const PosePair& pair : pairs) {
+    estimated.push_back(pair.estimate.T_world_camera.translation());
+    actual.push_back(pair.truth.T_world_camera.translation());
   }
-  const Eigen::Matrix4d transform = Eigen::umeyama(estimated, actual, false);
-  return Se3(Eigen::Quaterniond(Eigen::Matrix3d(transform.topLeftCorner<3, 3>())), transform.topRightCorner<3, 1>());
+  return align_points(actual, estimated);
 }
 
 ErrorStatistics error_statistics(std::vector<double> values) {

@@ -53,8 +53,7 @@ constexpr std::size_t kMinPosePairs = 10;
 /// Each estimate with the true pose that is nearest in time (the later one of two as near), within the limit.
 std::vector<PosePair> pair_by_stamp(const Trajectory& truth, const Trajectory& estimate, double limit_s);
 
-/// The rigid transform that brings the estimated positions onto the true ones, without scale. Source: Umeyama, "Least-squares
-/// estimation of transformation parameters between two point patterns", PAMI 1991. Needs at least one pair.
+/// The rigid transform that brings the estimated positions onto the true ones (core/rigid_alignment.h). Needs at least three pairs.
 Se3 align_positions(const std::vector<PosePair>& pairs);
 
 /// Needs at least one value.

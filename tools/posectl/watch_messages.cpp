@@ -62,6 +62,7 @@ HealthReport from_status_message(const status_t& message) {
   health.source_ended = message.source_ended != 0;
   health.frames_captured = count_of(message.frames_captured);
   health.frames_skipped = count_of(message.frames_skipped);
+  health.frames_missed = count_of(message.frames_missed);
   health.frames_no_slot = count_of(message.frames_no_slot);
   health.frames_dropped = count_of(message.frames_dropped);
   health.frames_tracked = count_of(message.frames_tracked);

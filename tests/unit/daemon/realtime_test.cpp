@@ -1,95 +1,19 @@
 // The pipeline's own part of the real-time rule: once they run, the capture and the tracking thread neither touch the heap nor take
-// a lock. This program replaces malloc and pthread_mutex_lock by counting ones; the sanitizers replace them too, so there it is
-// skipped.
+// a lock. (tests/system/hot_path_test.cpp shows the same of the whole tracker.)
 #include <atomic>
-#include <cerrno>
-#include <cstddef>
 #include <cstdint>
-#include <dlfcn.h>
+#include <functional>
 #include <memory>
 #include <mutex>
-#include <pthread.h>
 #include <string>
-#include <string_view>
 #include <thread>
 
 #include <gtest/gtest.h>
 
-#include "core/thread.h"
 #include "daemon/pipeline.h"
+#include "tests/support/hot_path_monitor.h"
 #include "tests/unit/daemon/fake_transport.h"
 #include "tests/unit/daemon/fakes.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define POSED_COUNTING 0
-#else
-#define POSED_COUNTING 1
-#endif
-
-namespace posed {
-namespace {
-
-std::atomic<bool> counting{false};
-std::atomic<std::uint64_t> heap_calls{0};
-std::atomic<std::uint64_t> locks{0};
-
-bool on_realtime_thread() {
-  const std::string_view name = current_thread_name();
-  return name == "capture" || name == "tracker";
-}
-
-[[maybe_unused]] void count(std::atomic<std::uint64_t>& counter) {
-  if (counting.load(std::memory_order_relaxed) && on_realtime_thread()) {
-    counter.fetch_add(1, std::memory_order_relaxed);
-  }
-}
-
-}  // namespace
-}  // namespace posed
-
-#if POSED_COUNTING
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* block, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-void __libc_free(void* block);
-
-void* malloc(std::size_t size) {
-  posed::count(posed::heap_calls);
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) {
-  posed::count(posed::heap_calls);
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, std::size_t size) {
-  posed::count(posed::heap_calls);
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  posed::count(posed::heap_calls);
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
-  posed::count(posed::heap_calls);
-  *block = __libc_memalign(alignment, size);
-  return *block == nullptr ? ENOMEM : 0;
-}
-void free(void* block) {
-  if (block != nullptr) {
-    posed::count(posed::heap_calls);
-  }
-  __libc_free(block);
-}
-int pthread_mutex_lock(pthread_mutex_t* mutex) {
-  using Lock = int (*)(pthread_mutex_t*);
-  static const Lock real = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
-  posed::count(posed::locks);
-  return real(mutex);
-}
-}
-#endif
 
 namespace posed {
 namespace {
@@ -102,11 +26,6 @@ class RealtimeTest : public ::testing::Test {
  protected:
   /// Runs the pipeline over stand-ins, counting after the warm-up.
   void run() {
-    if (POSED_COUNTING == 0) {
-      GTEST_SKIP() << "the sanitizers have the heap to themselves";
-    }
-    heap_calls = 0;
-    locks = 0;
     Config config;
     PipelineParts parts;
     parts.source = std::make_unique<FakeSource>([this](std::uint64_t call) {
@@ -114,7 +33,11 @@ class RealtimeTest : public ::testing::Test {
       while (call % kBurst == 0 && newest_tracked_.load() + 1 < call) {
         std::this_thread::yield();
       }
-      counting = call >= kWarmUpFrames && call < kWarmUpFrames + kCountedFrames;
+      if (call == kWarmUpFrames) {
+        test::watch_hot_path({"capture", "tracker"});
+      } else if (call == kWarmUpFrames + kCountedFrames) {
+        counts_ = test::hot_path_counts();
+      }
       return FakeSource::recording(kWarmUpFrames + kCountedFrames + 1)(call);
     });
     auto tracker = std::make_unique<FakeTracker>();
@@ -141,12 +64,14 @@ class RealtimeTest : public ::testing::Test {
   std::function<void(const RgbdFrame&)> during_tracking_ = [](const RgbdFrame&) {};
   std::atomic<std::uint64_t> newest_tracked_{0};
   std::uint64_t published_ = 0;
+  test::HotPathCounts counts_;
 };
 
 TEST_F(RealtimeTest, CaptureAndTrackingNeitherAllocateNorLock) {
   run();
-  EXPECT_EQ(heap_calls, 0U);
-  EXPECT_EQ(locks, 0U);
+  EXPECT_EQ(counts_.allocations, 0) << counts_.first_stack;
+  EXPECT_EQ(counts_.locks, 0) << counts_.first_stack;
+  EXPECT_EQ(counts_.blocking_calls, 0) << counts_.first_stack;
 }
 
 TEST_F(RealtimeTest, TheCountsWouldShowIt) {
@@ -158,10 +83,8 @@ TEST_F(RealtimeTest, TheCountsWouldShowIt) {
     }
   };
   run();
-  if (!IsSkipped()) {
-    EXPECT_GT(heap_calls, 0U);
-    EXPECT_GT(locks, 0U);
-  }
+  EXPECT_GT(counts_.allocations, 0);
+  EXPECT_GT(counts_.locks, 0);
 }
 
 }  // namespace

@@ -164,10 +164,11 @@ TEST(DescribeHealth, NamesStateRateAndLosses) {
   health.frames_lost = 10;
   health.frames_skipped = 1;
   health.frames_no_slot = 2;
+  health.frames_missed = 8;
   health.frames_dropped = 4;
   const std::string line = describe(health, 29.97);
   EXPECT_NE(line.find("tracking, source failed, 30.0 frames/s"), std::string::npos) << line;
-  EXPECT_NE(line.find("tracked 90, lost 10, not processed 7"), std::string::npos) << line;
+  EXPECT_NE(line.find("tracked 90, lost 10, not processed 15"), std::string::npos) << line;
 }
 
 TEST(ExitCode, TellsMistakesFromTroubles) {
