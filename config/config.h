@@ -59,7 +59,7 @@ struct TrackerConfig {
 
 struct MapperConfig {
   int max_keyframes = 200;      ///< kept in the map
-  int local_landmarks = 8000;  ///< in the snapshot the tracker sees
+  int local_landmarks = 8000;   ///< in the snapshot the tracker sees
   int local_keyframes = 25;     ///< whose landmarks make the local map
   int recovery_keyframes = 20;  ///< recent ones to match against when lost
 };
