@@ -59,8 +59,17 @@ class Watcher {
 
  private:
   Status open();
-  void on_pose(const lcm::ReceiveBuffer* buffer, const std::string& channel, const pose_t* message);
-  void on_status(const lcm::ReceiveBuffer* buffer, const std::string& channel, const status_t* message);
+
+  /// A function with a context, not a member: through LCM's pointer to a member, gcc 12's null check sees a null that is not there.
+  template <typename Message>
+  void subscribe(const char* channel) {
+    void (*handler)(const lcm::ReceiveBuffer*, const std::string&, const Message*, Watcher*) =
+        [](const lcm::ReceiveBuffer*, const std::string&, const Message* message, Watcher* self) { self->take(*message); };
+    lcm_.subscribeFunction(options_.prefix + channel, handler, this)->setQueueCapacity(kQueueCapacity);
+  }
+
+  void take(const pose_t& message);
+  void take(const status_t& message);
   Status receive();
   void show(TimeNs now_ns);
   void draw_table();
@@ -94,25 +103,25 @@ Status Watcher::open() {
     csv_.open(options_.csv);
     csv_ << watch_csv_header();
   }
-  lcm_.subscribe(options_.prefix + "POSE", &Watcher::on_pose, this)->setQueueCapacity(kQueueCapacity);
-  lcm_.subscribe(options_.prefix + "STATUS", &Watcher::on_status, this)->setQueueCapacity(kQueueCapacity);
+  subscribe<pose_t>("POSE");
+  subscribe<status_t>("STATUS");
   return {};
 }
 
-void Watcher::on_pose(const lcm::ReceiveBuffer* /*buffer*/, const std::string& /*channel*/, const pose_t* message) {
+void Watcher::take(const pose_t& message) {
   if (complete()) {
     return;  // what LCM had in its queue beyond the count
   }
   last_message_ns_ = SystemClock::instance().now_ns();
-  statistics_.observe(from_pose_message(*message, last_message_ns_));
+  statistics_.observe(from_pose_message(message, last_message_ns_));
   if (csv_.is_open()) {
     csv_ << watch_csv_row(statistics_.last);
   }
 }
 
-void Watcher::on_status(const lcm::ReceiveBuffer* /*buffer*/, const std::string& /*channel*/, const status_t* message) {
+void Watcher::take(const status_t& message) {
   last_message_ns_ = SystemClock::instance().now_ns();
-  health_ = from_status_message(*message);
+  health_ = from_status_message(message);
 }
 
 Status Watcher::receive() {
