@@ -12,7 +12,7 @@ namespace posed {
 namespace {
 
 struct Scene {
-  FeatureWorld world{1, 6500};
+  FeatureWorld world{1, 2900};
   TrackerConfig config = [] {
     TrackerConfig t;
     t.close_depth_m = 10;
