@@ -1,4 +1,5 @@
 #include <cstdlib>
+#include <ostream>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -159,6 +160,10 @@ struct Shipped {
   int width, height;
   double fx, fy, cx, cy, k1, k2, p1, p2, k3, baseline_fx;
 };
+
+void PrintTo(const Shipped& camera, std::ostream* out) {
+  *out << camera.name;
+}
 
 class ShippedCamera : public testing::TestWithParam<Shipped> {};
 

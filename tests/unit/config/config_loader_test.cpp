@@ -269,7 +269,7 @@ TEST_F(ConfigLoader, RulesBetweenKeys) {
       "posed.toml:2:18: tracker.fast_threshold: 6: tracker.fast_threshold_minimum (7) must be at most tracker.fast_threshold (6)");
   EXPECT_EQ(error_of("[tracker]\nfeatures = 100\nmin_inliers = 100"),
             "posed.toml:3:15: tracker.min_inliers: 100: tracker.min_inliers (100) must be less than tracker.features (100)");
-  EXPECT_EQ(error_of("[mapper]\nmax_keyframes = 15"),
+  EXPECT_EQ(error_of("[mapper]\nmax_keyframes = 15\nlocal_keyframes = 15"),
             "posed.toml:2:17: mapper.max_keyframes: 15: mapper.recovery_keyframes (20) must be at most mapper.max_keyframes (15)");
   EXPECT_EQ(
       error_of("[mapper]\nlocal_keyframes = 201"),
