@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/file_io.h"
+#include "core/file_io.h"
 #include "drivers/pixel_conversion.h"
 
 namespace posed {

@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/file_io.h"
+#include "core/file_io.h"
 
 namespace posed {
 

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/file_io.h"
+#include "core/file_io.h"
 #include "drivers/image_writer.h"
 #include "drivers/tum_list.h"
 

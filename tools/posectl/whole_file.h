@@ -6,18 +6,17 @@
 
 #include "core/result.h"
 
-/// Whole files in and out. All reentrant.
+/// Whole text files in and out (core/file_io.h), and the question whether out will work. All reentrant.
 namespace posed {
 
-/// Errors: NotFound, or Io with the system's reason.
+/// Errors: as `read_file`.
 Result<std::string> read_whole_file(const std::filesystem::path& path);
 
 /// Whether `path` could be written: its folder exists and may be written to, and it is not a folder itself. To be asked before a
 /// long run. Error: Io.
 Status check_writable(const std::filesystem::path& path);
 
-/// Writes a file beside `path` and renames it, so that a reader sees the old file or the whole new one. What is not a regular file
-/// (/dev/stdout, a pipe) is written to directly. Error: Io.
+/// Errors: as `write_file`.
 Status write_whole_file(const std::filesystem::path& path, std::string_view contents);
 
 }  // namespace posed

@@ -5,23 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/freiburg1_camera.h"
+
 namespace posed {
 namespace {
-
-/// The colour camera of the TUM RGB-D benchmark's first robot (freiburg1): the strongest distortion among the shipped calibrations.
-CameraIntrinsics strong_lens() {
-  CameraIntrinsics k;
-  k.fx = 517.306408;
-  k.fy = 516.469215;
-  k.cx = 318.643040;
-  k.cy = 255.313989;
-  k.k1 = 0.262383;
-  k.k2 = -0.953104;
-  k.p1 = -0.005358;
-  k.p2 = 0.002628;
-  k.k3 = 1.163314;
-  return k;
-}
 
 TEST(PinholeCamera, ProjectsAPointOnTheAxisToThePrincipalPoint) {
   const PinholeCamera camera{CameraIntrinsics{}};
@@ -31,7 +18,7 @@ TEST(PinholeCamera, ProjectsAPointOnTheAxisToThePrincipalPoint) {
 }
 
 TEST(PinholeCamera, UnprojectUndoesProject) {
-  const PinholeCamera camera(strong_lens());
+  const PinholeCamera camera(freiburg1_camera());
   for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.3, -0.2, 1.0), Eigen::Vector3d(-2, 1, 4), Eigen::Vector3d(0.01, 0.02, 0.4)}) {
     EXPECT_LT((camera.unproject(camera.project(p), p.z()) - p).norm(), 1e-14);
   }
@@ -77,7 +64,7 @@ TEST(PinholeCamera, DistortsAsTheBrownConradyModelSays) {
 }
 
 TEST(PinholeCamera, UndistortInvertsAStrongLensOverTheWholeImage) {
-  const PinholeCamera camera(strong_lens());
+  const PinholeCamera camera(freiburg1_camera());
   double worst = 0;
   double largest_shift = 0;
   for (int y = 0; y < 480; ++y) {
@@ -95,7 +82,7 @@ TEST(PinholeCamera, UndistortInvertsAStrongLensOverTheWholeImage) {
 TEST(PinholeCamera, DistortionGrowsOutwardsWithoutFoldingBack) {
   // The inverse is unique only while pixels further out stay further out: check it along rays from the centre to every border
   // pixel.
-  const PinholeCamera camera(strong_lens());
+  const PinholeCamera camera(freiburg1_camera());
   const Eigen::Vector2d centre(camera.intrinsics().cx, camera.intrinsics().cy);
   for (int x = 0; x < 640; x += 3) {
     for (const int y : {0, 479}) {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "drivers/file_io.h"
+#include "core/file_io.h"
 #include "tests/support/test_recording.h"
 
 namespace posed {

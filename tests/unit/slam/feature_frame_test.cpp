@@ -7,25 +7,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/freiburg1_camera.h"
+
 namespace posed {
 namespace {
 
-CameraIntrinsics freiburg1() {
-  CameraIntrinsics k;
-  k.fx = 517.306408;
-  k.fy = 516.469215;
-  k.cx = 318.643040;
-  k.cy = 255.313989;
-  k.k1 = 0.262383;
-  k.k2 = -0.953104;
-  k.p1 = -0.005358;
-  k.p2 = 0.002628;
-  k.k3 = 1.163314;
-  return k;
-}
-
 struct FeatureFrameTest : testing::Test {
-  PinholeCamera camera{freiburg1()};
+  PinholeCamera camera{freiburg1_camera()};
   FeatureFrame frame{camera, 2000};
   std::vector<float> depth = std::vector<float>(640 * 480, 2.0F);
   ImageView<const float> depth_view{depth.data(), 640, 480, 640, 1};

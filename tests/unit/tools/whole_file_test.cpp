@@ -64,7 +64,7 @@ TEST(WholeFile, AMissingFileIsNotFound) {
 TEST(WholeFile, AFolderCannotBeRead) {
   const Result<std::string> text = read_whole_file("/");
   ASSERT_FALSE(text);
-  EXPECT_EQ(text.error().code, ErrorCode::Io);
+  EXPECT_EQ(text.error().code, ErrorCode::BadData);
 }
 
 TEST(CheckWritable, AcceptsNewAndExistingFilesAndDevices) {

@@ -11,15 +11,16 @@
 /// Whole files in, whole files out. Reentrant. Messages name the file and what the system said.
 namespace posed {
 
-/// No image or list of a recording comes near this; what is larger is refused before it is read.
+/// No image, list or trajectory comes near this; what is larger is refused before it is read.
 constexpr std::size_t kMaxFileBytes = std::size_t{64} << 20;
 
 /// Reads `path` into `bytes`, whose capacity is kept from call to call. Errors: NotFound; BadData where it is no regular file or
 /// larger than `max_bytes`; Io.
 Status read_file(const std::filesystem::path& path, std::vector<std::uint8_t>& bytes, std::size_t max_bytes = kMaxFileBytes);
 
-/// Writes a temporary file beside `path` and renames it, so that a reader sees the old file or the whole new one. It does not wait
-/// for the disk (no fsync). Error: Io, a full disk included; the temporary file is then removed.
+/// Writes a temporary file beside `path` and renames it, so that a reader sees the old file or the whole new one. What exists and is no
+/// regular file (/dev/stdout, a pipe) is written to directly. It does not wait for the disk (no fsync). Errors: NotFound (no such folder);
+/// Io, a full disk included; the temporary file is then removed.
 Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 
 }  // namespace posed

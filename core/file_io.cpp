@@ -1,4 +1,4 @@
-#include "drivers/file_io.h"
+#include "core/file_io.h"
 
 #include <cerrno>
 #include <cstdio>
@@ -95,22 +95,28 @@ Status read_file(const std::filesystem::path& path, std::vector<std::uint8_t>& b
 }
 
 Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
-  const std::filesystem::path temporary = path.string() + ".part";
+  std::error_code ignored;
+  const bool in_place = std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored) &&
+                        !std::filesystem::is_directory(path, ignored);
+  const std::filesystem::path target = in_place ? path : std::filesystem::path(path.string() + ".part");
   int error = 0;
   {
-    FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    const int create = in_place ? 0 : O_CREAT | O_TRUNC;
+    FileDescriptor file(::open(target.c_str(), O_WRONLY | O_CLOEXEC | create, 0666));
     if (file.get() < 0) {
-      return system_error("create", temporary, errno);
+      return system_error("create", target, errno);
     }
     error = write_all(file.get(), bytes);
     const int close_error = file.close();
     error = error != 0 ? error : close_error;
   }
-  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) {
+  if (error == 0 && !in_place && std::rename(target.c_str(), path.c_str()) != 0) {
     error = errno;
   }
   if (error != 0) {
-    ::unlink(temporary.c_str());
+    if (!in_place) {
+      ::unlink(target.c_str());
+    }
     return system_error("write", path, error);
   }
   return {};
