@@ -18,9 +18,9 @@ constexpr std::size_t kMaxFileBytes = std::size_t{64} << 20;
 /// larger than `max_bytes`; Io.
 Status read_file(const std::filesystem::path& path, std::vector<std::uint8_t>& bytes, std::size_t max_bytes = kMaxFileBytes);
 
-/// Writes a temporary file beside `path` and renames it, so that a reader sees the old file or the whole new one. What exists and is no
-/// regular file (/dev/stdout, a pipe) is written to directly. It does not wait for the disk (no fsync). Errors: NotFound (no such folder);
-/// Io, a full disk included; the temporary file is then removed.
+/// Writes a temporary file beside `path` and renames it, so that a reader sees the old file or the whole new one. What exists and
+/// is no regular file (/dev/stdout, a pipe) is written to directly. It does not wait for the disk (no fsync). Errors: NotFound (no
+/// such folder); Io, a full disk included; the temporary file is then removed.
 Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 
 }  // namespace posed

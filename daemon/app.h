@@ -16,17 +16,17 @@ namespace posed {
 
 struct AppOptions {
   bool publish = true;  ///< start LCM; false for tools that only want the trajectory
-  /// Called for every frame the tracker processed, in order, after it was published, on the publisher thread. May block for short (in
-  /// lockstep nothing is lost; in real time the queue before the publisher overflows and counts).
+  /// Called for every frame the tracker processed, in order, after it was published, on the publisher thread. May block for short
+  /// (in lockstep nothing is lost; in real time the queue before the publisher overflows and counts).
   std::function<void(const PoseEstimate&)> on_estimate;
   /// Called when the source skips a bad frame or fails, on the capture thread, with the reason.
   std::function<void(const Error&)> on_source_error;
 };
 
-/// The pipeline: the one place that owns the threads and wires source, tracker, mapper and publisher together (docs/threads.md). The
-/// daemon and `posectl replay` run this same class. With Pacing::Realtime every stage has its own thread. With Pacing::Lockstep capture,
-/// tracking and mapping take turns on one thread, so that nothing is dropped and the result is a function of the input alone.
-/// Thread-bound to the thread that made it, but for `health`, which is thread-safe.
+/// The pipeline: the one place that owns the threads and wires source, tracker, mapper and publisher together (docs/threads.md).
+/// The daemon and `posectl replay` run this same class. With Pacing::Realtime every stage has its own thread. With Pacing::Lockstep
+/// capture, tracking and mapping take turns on one thread, so that nothing is dropped and the result is a function of the input
+/// alone. Thread-bound to the thread that made it, but for `health`, which is thread-safe.
 class App {
  public:
   /// Opens the source and allocates everything. Nothing runs yet.

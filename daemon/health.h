@@ -24,9 +24,9 @@ struct HealthReport {
   std::uint64_t keyframes = 0;        ///< handed to the mapper
   std::uint64_t keyframes_delayed = 0;  ///< frames on which the mapper's queue was full
   std::uint64_t poses_published = 0;
-  std::uint64_t poses_dropped = 0;    ///< handed back by the full queue before the publisher
+  std::uint64_t poses_dropped = 0;  ///< handed back by the full queue before the publisher
   std::uint64_t publish_errors = 0;
-  bool transport_up = false;          ///< LCM runs
+  bool transport_up = false;  ///< LCM runs
 
   std::size_t map_keyframes = 0;
   std::size_t map_landmarks = 0;

@@ -16,18 +16,18 @@ struct SourceInfo {
   std::string description;  ///< for people: "replay of DIR, 480 frames"
   int width = 0;
   int height = 0;
-  double rate_hz = 0;             ///< nominal
+  double rate_hz = 0;              ///< nominal
   std::uint64_t total_frames = 0;  ///< 0 where unknown or endless
-  std::size_t slots_held = 0;     ///< frames of the pool that the source may hold for itself (decoded ahead)
+  std::size_t slots_held = 0;      ///< frames of the pool that the source may hold for itself (decoded ahead)
 };
 
 enum class CaptureKind {
-  Frame,        ///< `frame` holds it
-  SkippedFrame, ///< a frame was bad and is left out; `error` says why, and the next call goes on
-  NoFreeSlot,   ///< the pool had no room; the frame is lost
-  EndOfStream,  ///< a recording or a bounded simulation has ended
-  Stopped,      ///< the stop token was triggered
-  Failed,       ///< the device is gone or the source cannot go on; `error` says why
+  Frame,         ///< `frame` holds it
+  SkippedFrame,  ///< a frame was bad and is left out; `error` says why, and the next call goes on
+  NoFreeSlot,    ///< the pool had no room; the frame is lost
+  EndOfStream,   ///< a recording or a bounded simulation has ended
+  Stopped,       ///< the stop token was triggered
+  Failed,        ///< the device is gone or the source cannot go on; `error` says why
 };
 
 struct Capture {
@@ -47,12 +47,13 @@ class RgbdSource {
   /// Begins delivery into slots of `pool`, whose frames have this source's size. The pool must outlive the source.
   virtual Status start(FramePool& pool) = 0;
 
-  /// Waits for the next frame. With Pacing::Realtime it returns when the frame is due; with Pacing::Lockstep as soon as it is ready,
-  /// and then NoFreeSlot is never returned: it waits for a slot. Returns within 100 ms of a stop request.
+  /// Waits for the next frame. With Pacing::Realtime it returns when the frame is due; with Pacing::Lockstep as soon as it is
+  /// ready, and then NoFreeSlot is never returned: it waits for a slot. Returns within 100 ms of a stop request.
   virtual Capture next(std::stop_token stop) = 0;
 };
 
 /// Opens the source that the configuration names. Errors: NotFound, BadData, InvalidArgument (size differs from the calibration).
-Result<std::unique_ptr<RgbdSource>> make_rgbd_source(const SourceConfig& config, const CameraIntrinsics& camera, const Clock& clock);
+Result<std::unique_ptr<RgbdSource>> make_rgbd_source(const SourceConfig& config, const CameraIntrinsics& camera,
+                                                     const Clock& clock);
 
 }  // namespace posed

@@ -40,7 +40,9 @@ int FeatureFrame::column_of(float u) const {
   return std::clamp(static_cast<int>((u - min_u_) * columns_per_pixel_), 0, kColumns - 1);
 }
 
-int FeatureFrame::row_of(float v) const { return std::clamp(static_cast<int>((v - min_v_) * rows_per_pixel_), 0, kRows - 1); }
+int FeatureFrame::row_of(float v) const {
+  return std::clamp(static_cast<int>((v - min_v_) * rows_per_pixel_), 0, kRows - 1);
+}
 
 void FeatureFrame::place(const PinholeCamera& camera, ImageView<const float> depth_m) {
   const std::size_t n = size();

@@ -13,8 +13,8 @@
 
 namespace posed {
 
-/// The features of one frame placed in space: undistorted, with depth, and in a grid for search by position. Index i of every vector is
-/// one keypoint. All vectors keep their capacity, so assigning a new frame to it does not allocate once warm. Reentrant.
+/// The features of one frame placed in space: undistorted, with depth, and in a grid for search by position. Index i of every
+/// vector is one keypoint. All vectors keep their capacity, so assigning a new frame to it does not allocate once warm. Reentrant.
 class FeatureFrame {
  public:
   /// `capacity`: keypoints to make room for.
@@ -31,8 +31,8 @@ class FeatureFrame {
   const std::vector<float>& depth_m() const { return depth_m_; }      ///< 0: none
   const std::vector<float>& disparity() const { return disparity_; }  ///< baseline_fx / depth [pixels]; 0: none
 
-  /// Indices of the keypoints within `radius` [pixels] of an ideal pixel along both axes and on a level in [min_level, max_level]. The
-  /// result lies in `scratch` and is valid until its next use.
+  /// Indices of the keypoints within `radius` [pixels] of an ideal pixel along both axes and on a level in [min_level, max_level].
+  /// The result lies in `scratch` and is valid until its next use.
   std::span<const std::uint16_t> search(float u, float v, float radius, int min_level, int max_level,
                                         std::vector<std::uint16_t>& scratch) const;
 

@@ -46,8 +46,8 @@ void KeyframeRecovery::match_descriptors(const MapSnapshot& map, const SnapshotK
   match_of_keypoint_.assign(frame.size(), -1);
   distances_.resize(frame.size());
   for (const std::uint32_t landmark : keyframe.landmarks) {
-    hamming_kernels().distances(map.landmarks[landmark].descriptor, frame.features().descriptors.data(), static_cast<int>(frame.size()),
-                                distances_.data());
+    hamming_kernels().distances(map.landmarks[landmark].descriptor, frame.features().descriptors.data(),
+                                static_cast<int>(frame.size()), distances_.data());
     std::size_t best = 0;
     std::uint16_t second_distance = 256;
     for (std::size_t i = 1; i < distances_.size(); ++i) {

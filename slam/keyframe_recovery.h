@@ -13,9 +13,9 @@
 
 namespace posed {
 
-/// Finds the camera again, without a prediction, by matching a frame against one recent keyframe: nearest descriptors both ways, then
-/// three-point 3D-3D RANSAC over the keypoints with depth, then the robust pose solver. Deterministic: the random numbers depend on the
-/// frame's content alone. Does not allocate once warm. Reentrant: one object a thread.
+/// Finds the camera again, without a prediction, by matching a frame against one recent keyframe: nearest descriptors both ways,
+/// then three-point 3D-3D RANSAC over the keypoints with depth, then the robust pose solver. Deterministic: the random numbers
+/// depend on the frame's content alone. Does not allocate once warm. Reentrant: one object a thread.
 class KeyframeRecovery {
  public:
   KeyframeRecovery(const PinholeCamera& camera, const TrackerConfig& config);
@@ -25,7 +25,8 @@ class KeyframeRecovery {
     int inliers = 0;
   };
   /// Nothing where fewer than `min_inliers` matches agree on a pose.
-  std::optional<Recovered> recover(const MapSnapshot& map, const SnapshotKeyframe& keyframe, const FeatureFrame& frame, int min_inliers);
+  std::optional<Recovered> recover(const MapSnapshot& map, const SnapshotKeyframe& keyframe, const FeatureFrame& frame,
+                                   int min_inliers);
 
  private:
   struct Match {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include <Eigen/LU>
@@ -18,8 +18,8 @@ namespace posed {
 
 namespace {
 
-constexpr double kMinDepth = 0.05;              // [m]
-constexpr double kChi2ThreeDof = 11.345;        // 99 %: an observation beyond does not move the landmark
+constexpr double kMinDepth = 0.05;                 // [m]
+constexpr double kChi2ThreeDof = 11.345;           // 99 %: an observation beyond does not move the landmark
 constexpr std::uint32_t kPredictedBeforeCull = 4;  // keyframes that should have seen a landmark before it is judged
 constexpr double kMinFoundShare = 0.3;
 constexpr std::size_t kDescriptorCandidates = 8;  // newest observations among which the descriptor is chosen
@@ -225,9 +225,10 @@ void LocalMapper::Impl::select_local_keyframes() {
     ranked.push_back({id, id == newest_id ? std::numeric_limits<int>::max() : shared[id], offset.norm()});
   }
   const auto count = std::min<std::size_t>(ranked.size(), static_cast<std::size_t>(config.local_keyframes));
-  std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count), ranked.end(), [](const Ranked& a, const Ranked& b) {
-    return a.shared != b.shared ? a.shared > b.shared : a.distance != b.distance ? a.distance < b.distance : a.id > b.id;
-  });
+  std::partial_sort(
+      ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count), ranked.end(), [](const Ranked& a, const Ranked& b) {
+        return a.shared != b.shared ? a.shared > b.shared : a.distance != b.distance ? a.distance < b.distance : a.id > b.id;
+      });
   local_keyframes.clear();
   for (std::size_t i = 0; i < count; ++i) {
     local_keyframes.push_back(ranked[i].id);
@@ -239,14 +240,15 @@ std::vector<LandmarkId> LocalMapper::Impl::local_landmarks() const {
   for (const KeyframeId keyframe : local_keyframes) {
     const Keyframe* k = map.find_keyframe(keyframe);
     if (k != nullptr) {
-      std::copy_if(k->landmarks.begin(), k->landmarks.end(), std::back_inserter(ids), [](LandmarkId id) { return id != kNoLandmark; });
+      std::copy_if(k->landmarks.begin(), k->landmarks.end(), std::back_inserter(ids),
+                   [](LandmarkId id) { return id != kNoLandmark; });
     }
   }
   // Landmarks of the better keyframes come first, so that the limit takes away the least related.
   std::vector<LandmarkId> kept;
-  std::unordered_map<LandmarkId, bool> seen;
+  std::unordered_set<LandmarkId> seen;
   for (const LandmarkId id : ids) {
-    if (kept.size() < static_cast<std::size_t>(config.local_landmarks) && seen.try_emplace(id, true).second) {
+    if (kept.size() < static_cast<std::size_t>(config.local_landmarks) && seen.insert(id).second) {
       kept.push_back(id);
     }
   }
@@ -258,7 +260,8 @@ std::vector<LandmarkId> LocalMapper::Impl::local_landmarks() const {
 void LocalMapper::Impl::limit_keyframes(KeyframeId newest) {
   while (map.keyframes().size() > static_cast<std::size_t>(config.max_keyframes)) {
     const auto oldest = std::find_if(map.keyframes().begin(), map.keyframes().end(), [&](const auto& entry) {
-      return entry.first != newest && std::find(local_keyframes.begin(), local_keyframes.end(), entry.first) == local_keyframes.end();
+      return entry.first != newest &&
+             std::find(local_keyframes.begin(), local_keyframes.end(), entry.first) == local_keyframes.end();
     });
     const auto dropped = oldest == map.keyframes().end() ? map.keyframes().begin() : oldest;
     const auto anchor = std::next(dropped);
@@ -325,10 +328,18 @@ LocalMapper::LocalMapper(const TrackerConfig& tracker, const MapperConfig& confi
     : impl_(std::make_unique<Impl>(tracker, config, camera)) {}
 LocalMapper::~LocalMapper() = default;
 
-void LocalMapper::insert(const KeyframeRecord& record) { impl_->insert(record); }
-void LocalMapper::write_snapshot(MapSnapshot& snapshot) const { impl_->write_snapshot(snapshot); }
-std::size_t LocalMapper::keyframe_count() const { return impl_->map.keyframes().size(); }
-std::size_t LocalMapper::landmark_count() const { return impl_->map.landmark_count(); }
+void LocalMapper::insert(const KeyframeRecord& record) {
+  impl_->insert(record);
+}
+void LocalMapper::write_snapshot(MapSnapshot& snapshot) const {
+  impl_->write_snapshot(snapshot);
+}
+std::size_t LocalMapper::keyframe_count() const {
+  return impl_->map.keyframes().size();
+}
+std::size_t LocalMapper::landmark_count() const {
+  return impl_->map.landmark_count();
+}
 
 std::optional<Se3> LocalMapper::keyframe_pose(KeyframeId id) const {
   // An anchor may itself have been dropped later; anchors are newer than what hangs on them, so this ends.

@@ -9,8 +9,8 @@
 
 namespace posed {
 
-/// Owns the map: takes keyframes in, makes and maintains landmarks, and writes snapshots for the tracker. Thread-bound: everything is
-/// called by one thread, the mapper's (in lockstep, the only one).
+/// Owns the map: takes keyframes in, makes and maintains landmarks, and writes snapshots for the tracker. Thread-bound: everything
+/// is called by one thread, the mapper's (in lockstep, the only one).
 class LocalMapper {
  public:
   LocalMapper(const TrackerConfig& tracker, const MapperConfig& config, const CameraIntrinsics& camera);

@@ -16,10 +16,10 @@ struct Observation {
 
 /// A point of the static world.
 struct Landmark {
-  Eigen::Vector3d p_map = Eigen::Vector3d::Zero();               ///< [m]
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();         ///< inverse covariance of p_map, given the keyframes' poses [1 / m^2]
-  Eigen::Vector3d mean_view_map = Eigen::Vector3d::Zero();       ///< unit vector, from the cameras to the landmark
-  float max_distance_m = 0;                                      ///< as in SnapshotLandmark
+  Eigen::Vector3d p_map = Eigen::Vector3d::Zero();          ///< [m]
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();    ///< inverse covariance of p_map, given the keyframes' poses [1 / m^2]
+  Eigen::Vector3d mean_view_map = Eigen::Vector3d::Zero();  ///< unit vector, from the cameras to the landmark
+  float max_distance_m = 0;                                 ///< as in SnapshotLandmark
   float min_distance_m = 0;
   Descriptor descriptor{};
   std::vector<Observation> observations;  ///< by ascending keyframe

@@ -14,7 +14,7 @@ namespace posed {
 /// A landmark as the tracker needs it to predict where, how large and from which side it is seen.
 struct SnapshotLandmark {
   LandmarkId id = kNoLandmark;
-  Eigen::Vector3f p_map = Eigen::Vector3f::Zero();        ///< [m]
+  Eigen::Vector3f p_map = Eigen::Vector3f::Zero();          ///< [m]
   Eigen::Vector3f mean_view_map = Eigen::Vector3f::Zero();  ///< unit vector from the observing cameras to the landmark, averaged
   float max_distance_m = 0;  ///< from here the pyramid's first level (0) shows it at the scale it was described at
   float min_distance_m = 0;  ///< from here the last level does
@@ -28,15 +28,15 @@ struct SnapshotKeyframe {
   std::vector<std::uint32_t> landmarks;  ///< indices into MapSnapshot::landmarks that this keyframe observes
 };
 
-/// The tracker's view of the map: the landmarks around the camera and the recent keyframes. Written by the mapper into a `LatestValue`,
-/// immutable while the tracker reads it.
+/// The tracker's view of the map: the landmarks around the camera and the recent keyframes. Written by the mapper into a
+/// `LatestValue`, immutable while the tracker reads it.
 struct MapSnapshot {
   std::uint64_t version = 0;  ///< counts up with each snapshot; 0: nothing mapped yet
   std::uint32_t map_id = 0;
   Se3 T_map_odom;
-  KeyframeId newest_keyframe = kNoKeyframe;     ///< the last one the mapper has taken in
-  std::vector<SnapshotLandmark> landmarks;      ///< by ascending id
-  std::vector<SnapshotKeyframe> keyframes;      ///< newest first
+  KeyframeId newest_keyframe = kNoKeyframe;  ///< the last one the mapper has taken in
+  std::vector<SnapshotLandmark> landmarks;   ///< by ascending id
+  std::vector<SnapshotKeyframe> keyframes;   ///< newest first
 };
 
 }  // namespace posed

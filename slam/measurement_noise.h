@@ -7,9 +7,10 @@
 
 namespace posed {
 
-/// How far a keypoint's measurements can be trusted. Pixel coordinates: one grey-level pixel of the pyramid level the corner was found on.
-/// Disparity: the depth sensor's own noise (Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and
-/// tracking", 3DIMPVT 2012, eq. 3), and what the pixel error does to the depth that is looked up on a slanted surface. Immutable.
+/// How far a keypoint's measurements can be trusted. Pixel coordinates: one grey-level pixel of the pyramid level the corner was
+/// found on. Disparity: the depth sensor's own noise (Nguyen, Izadi, Lovell, "Modeling Kinect sensor noise for improved 3D
+/// reconstruction and tracking", 3DIMPVT 2012, eq. 3), and what the pixel error does to the depth that is looked up on a slanted
+/// surface. Immutable.
 class MeasurementNoise {
  public:
   MeasurementNoise(const TrackerConfig& config, const CameraIntrinsics& camera) : baseline_fx_(camera.baseline_fx) {

@@ -7,8 +7,8 @@
 
 namespace posed {
 
-/// Predicts the camera's pose on the assumption that it goes on moving as between the last two frames (constant velocity, scaled by the
-/// time that passed, so that a dropped frame does no harm). Reentrant.
+/// Predicts the camera's pose on the assumption that it goes on moving as between the last two frames (constant velocity, scaled by
+/// the time that passed, so that a dropped frame does no harm). Reentrant.
 class MotionModel {
  public:
   /// Forgets everything: after a jump, what was before says nothing of what comes.

@@ -31,7 +31,9 @@ struct NormalEquations {
   double cost = 0;
 };
 
-double chi2_bound(const PoseObservation& o) { return o.disparity > 0 ? kChi2ThreeDof : kChi2TwoDof; }
+double chi2_bound(const PoseObservation& o) {
+  return o.disparity > 0 ? kChi2ThreeDof : kChi2TwoDof;
+}
 
 /// World-to-camera in the form that the inner loop wants.
 struct Projection {
@@ -104,7 +106,8 @@ NormalEquations linearise(const PinholeCamera& camera, const Se3& T_map_camera, 
     const Residual r = projection.residual(o);
     const double bound = chi2_bound(o);
     if (!std::isfinite(r.chi2)) {
-      n.cost += 4.0 * bound;  // a point behind the camera: a fixed penalty, so that a step that causes it does not look like progress
+      n.cost +=
+          4.0 * bound;  // a point behind the camera: a fixed penalty, so that a step that causes it does not look like progress
       continue;
     }
     const bool linear_part = robust && r.chi2 > bound;
@@ -197,7 +200,8 @@ PoseSolution solve_pose(const PinholeCamera& camera, const Se3& initial_T_map_ca
     return solution;
   }
   // With residuals cut off, the estimate scatters more than the inverse Hessian says, by the reciprocal of the kept variance: the
-  // asymptotic variance of a skipped mean (Huber, "Robust Statistics", 1981, section 4.7, with psi(x) = x up to the bound and 0 beyond).
+  // asymptotic variance of a skipped mean (Huber, "Robust Statistics", 1981, section 4.7, with psi(x) = x up to the bound and 0
+  // beyond).
   const double kept_variance = c.expected_chi2 / c.residuals;
   const double freedom = static_cast<double>(std::max(1, c.residuals - 6)) / c.residuals;
   solution.variance_factor = c.chi2 / (freedom * c.expected_chi2);

@@ -10,9 +10,9 @@ namespace posed {
 
 namespace {
 
-constexpr float kMinDepth = 0.05F;           // [m]
-constexpr float kMinViewCosine = 0.5F;       // 60 degrees off the mean view a patch has changed too much
-constexpr float kScaleRangeSlack = 1.2F;     // a landmark is looked for a little beyond the scales it was seen at
+constexpr float kMinDepth = 0.05F;        // [m]
+constexpr float kMinViewCosine = 0.5F;    // 60 degrees off the mean view a patch has changed too much
+constexpr float kScaleRangeSlack = 1.2F;  // a landmark is looked for a little beyond the scales it was seen at
 constexpr std::uint16_t kNoDistance = std::numeric_limits<std::uint16_t>::max();
 
 }  // namespace
@@ -31,7 +31,8 @@ ProjectionMatcher::ProjectionMatcher(const PinholeCamera& camera, const TrackerC
 }
 
 bool ProjectionMatcher::project(const MapSnapshot& map, std::uint32_t landmark, const Eigen::Matrix3f& R_camera_map,
-                                const Eigen::Vector3f& t_camera_map, const FeatureFrame& frame, ProjectedLandmark& projected) const {
+                                const Eigen::Vector3f& t_camera_map, const FeatureFrame& frame,
+                                ProjectedLandmark& projected) const {
   const SnapshotLandmark& l = map.landmarks[landmark];
   const Eigen::Vector3f p = R_camera_map * l.p_map + t_camera_map;
   if (p.z() < kMinDepth) {
@@ -65,7 +66,8 @@ ProjectionMatcher::Candidate ProjectionMatcher::best_candidate(const SnapshotLan
                                                                const std::vector<std::int32_t>& landmark_of) {
   const float radius = options.radius * scale_[static_cast<std::size_t>(p.level)];
   const std::span<const std::uint16_t> found = frame.search(p.u, p.v, radius, p.level - 1, p.level + 1, nearby_);
-  // Keypoints that are taken, or whose depth contradicts the prediction, are no candidates; `found` lies in nearby_, so thin it there.
+  // Keypoints that are taken, or whose depth contradicts the prediction, are no candidates; `found` lies in nearby_, so thin it
+  // there.
   std::size_t kept = 0;
   for (const std::uint16_t i : found) {
     const float disparity = frame.disparity()[i];
@@ -77,8 +79,8 @@ ProjectionMatcher::Candidate ProjectionMatcher::best_candidate(const SnapshotLan
     return {};
   }
   distances_.resize(kept);
-  hamming_kernels().distances_indexed(landmark.descriptor, frame.features().descriptors.data(), nearby_.data(), static_cast<int>(kept),
-                                      distances_.data());
+  hamming_kernels().distances_indexed(landmark.descriptor, frame.features().descriptors.data(), nearby_.data(),
+                                      static_cast<int>(kept), distances_.data());
   std::size_t best = 0;
   int second_distance = std::numeric_limits<int>::max();
   std::size_t second = kept;

@@ -16,15 +16,15 @@ struct ProjectedLandmark {
   std::uint32_t landmark = 0;  ///< index into MapSnapshot::landmarks
   float u = 0;                 ///< ideal pixel
   float v = 0;
-  float disparity = 0;  ///< baseline_fx / depth [pixels]
+  float disparity = 0;    ///< baseline_fx / depth [pixels]
   float view_cosine = 1;  ///< between the viewing ray and the landmark's mean view
-  int level = 0;  ///< pyramid level it should be found on
+  int level = 0;          ///< pyramid level it should be found on
 };
 
 struct MatchOptions {
-  float radius = 4.0F;       ///< search window's half side on level 0 [pixels]; grows with the level's scale
-  int max_distance = 80;     ///< bits of 256
-  float max_ratio = 0.85F;   ///< best over second best distance, where both lie on one level
+  float radius = 4.0F;      ///< search window's half side on level 0 [pixels]; grows with the level's scale
+  int max_distance = 80;    ///< bits of 256
+  float max_ratio = 0.85F;  ///< best over second best distance, where both lie on one level
 };
 
 constexpr std::int32_t kUnmatched = -1;
@@ -37,13 +37,13 @@ class ProjectionMatcher {
 
   /// Landmark seen from `T_camera_map`, or nothing where it is behind, outside of the image, out of its range of scale or seen too
   /// obliquely.
-  bool project(const MapSnapshot& map, std::uint32_t landmark, const Eigen::Matrix3f& R_camera_map, const Eigen::Vector3f& t_camera_map,
-               const FeatureFrame& frame, ProjectedLandmark& projected) const;
+  bool project(const MapSnapshot& map, std::uint32_t landmark, const Eigen::Matrix3f& R_camera_map,
+               const Eigen::Vector3f& t_camera_map, const FeatureFrame& frame, ProjectedLandmark& projected) const;
 
-  /// Matches `projected` to keypoints whose entry in `landmark_of` is kUnmatched, and writes the landmark's index there; a keypoint that
-  /// several landmarks want goes to the nearest descriptor. Returns the number of new matches.
-  int match(const MapSnapshot& map, std::span<const ProjectedLandmark> projected, const FeatureFrame& frame, const MatchOptions& options,
-            std::vector<std::int32_t>& landmark_of);
+  /// Matches `projected` to keypoints whose entry in `landmark_of` is kUnmatched, and writes the landmark's index there; a keypoint
+  /// that several landmarks want goes to the nearest descriptor. Returns the number of new matches.
+  int match(const MapSnapshot& map, std::span<const ProjectedLandmark> projected, const FeatureFrame& frame,
+            const MatchOptions& options, std::vector<std::int32_t>& landmark_of);
 
   float scale(int level) const { return scale_[static_cast<std::size_t>(level)]; }
 

@@ -20,14 +20,16 @@ constexpr int kMinDepthsToInitialize = 100;  // keypoints with depth that a firs
 constexpr float kPredictedRadius = 10.0F;    // [pixels on level 0] around last frame's landmarks where the motion model puts them
 constexpr float kWideRadius = 30.0F;         // the same when that finds too little
 constexpr int kFewMatches = 40;
-constexpr float kLocalMapRadius = 5.0F;      // around the local map's landmarks once the pose is nearly known
-constexpr KeyframeId kYoungMapKeyframes = 5;        // a map that is lost before it has as many is not worth finding again
-constexpr int kRecoveriesPerFrame = 2;       // keyframes tried a frame, so that a lost tracker stays in its time
+constexpr float kLocalMapRadius = 5.0F;       // around the local map's landmarks once the pose is nearly known
+constexpr KeyframeId kYoungMapKeyframes = 5;  // a map that is lost before it has as many is not worth finding again
+constexpr int kRecoveriesPerFrame = 2;        // keyframes tried a frame, so that a lost tracker stays in its time
 constexpr int kMinRecoveryInliers = 15;
-constexpr int kCloseTracked = 100;           // fewer close landmarks tracked and...
-constexpr int kCloseUntracked = 70;          // ...more close keypoints unmatched than this asks for a keyframe
+constexpr int kCloseTracked = 100;   // fewer close landmarks tracked and...
+constexpr int kCloseUntracked = 70;  // ...more close keypoints unmatched than this asks for a keyframe
 
-TimeNs now_ns() { return SystemClock::instance().now_ns(); }
+TimeNs now_ns() {
+  return SystemClock::instance().now_ns();
+}
 
 }  // namespace
 
@@ -77,10 +79,10 @@ struct Tracker::Impl {
   KeyframeId last_keyframe = kNoKeyframe;
   int frames_since_keyframe = 0;
   int reference_inliers = 0;  // best seen since the mapper took the last keyframe in
-  bool needs_map = true;  // the next good frame begins one
+  bool needs_map = true;      // the next good frame begins one
   std::uint32_t map_id = 0;
   KeyframeId map_begin = kNoKeyframe;  // last keyframe before the map began
-  std::size_t next_recovery = 0;
+  std::size_t next_recovery = 0;       // index into the snapshot's keyframes, newest first
 };
 
 Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, const CameraIntrinsics& intrinsics,
@@ -103,7 +105,8 @@ Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, co
   landmark_taken.reserve(landmarks);
 }
 
-/// The first keyframe of a map defines it. A frame without enough depth, or a mapper that cannot take it, leaves everything as it is.
+/// The first keyframe of a map defines it. A frame without enough depth, or a mapper that cannot take it, leaves everything as it
+/// is.
 void Tracker::Impl::initialize(const KeyframeRecord* candidate) {
   const auto depths = std::count_if(frame.depth_m().begin(), frame.depth_m().end(), [](float z) { return z > 0; });
   if (candidate == nullptr || depths < kMinDepthsToInitialize) {
@@ -176,8 +179,9 @@ PoseSolution Tracker::Impl::solve(const MapSnapshot& map, const Se3& initial) {
     }
     const int level = frame.features().keypoints[i].level;
     const double z = frame.depth_m()[i];
-    observations.push_back({map.landmarks[static_cast<std::size_t>(landmark_of[i])].p_map.cast<double>(), frame.ideal_pixels()[i].cast<double>(),
-                            frame.disparity()[i], noise.pixel_weight(level), z > 0 ? noise.disparity_weight(level, z) : 0.0, true});
+    observations.push_back({map.landmarks[static_cast<std::size_t>(landmark_of[i])].p_map.cast<double>(),
+                            frame.ideal_pixels()[i].cast<double>(), frame.disparity()[i], noise.pixel_weight(level),
+                            z > 0 ? noise.disparity_weight(level, z) : 0.0, true});
     observed_keypoint.push_back(static_cast<std::uint16_t>(i));
   }
   const PoseSolution result = solve_pose(camera, initial, observations);
@@ -286,7 +290,14 @@ void Tracker::Impl::find_camera(const MapSnapshot& map) {
     state = TrackingState::Initializing;  // the mapper is still busy with the first keyframe
     return;
   }
-  if ((state != TrackingState::Lost && track_by_motion(map)) || recover(map)) {
+  if (state != TrackingState::Lost) {
+    next_recovery = 0;  // just lost, it is most likely near the newest keyframes
+    if (track_by_motion(map)) {
+      state = TrackingState::Tracking;
+      return;
+    }
+  }
+  if (recover(map)) {
     state = TrackingState::Tracking;
     return;
   }
@@ -342,7 +353,8 @@ PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map,
   return estimate;
 }
 
-Tracker::Tracker(const TrackerConfig& config, const MapperConfig& mapper, const CameraIntrinsics& camera, const Se3& T_map_camera_start)
+Tracker::Tracker(const TrackerConfig& config, const MapperConfig& mapper, const CameraIntrinsics& camera,
+                 const Se3& T_map_camera_start)
     : impl_(std::make_unique<Impl>(config, mapper, camera, T_map_camera_start)) {}
 Tracker::~Tracker() = default;
 
@@ -350,6 +362,8 @@ PoseEstimate Tracker::track(const RgbdFrame& frame, const MapSnapshot& map, Keyf
   return impl_->track(frame, map, candidate);
 }
 
-const Tracker::Timing& Tracker::last_timing() const { return impl_->timing; }
+const Tracker::Timing& Tracker::last_timing() const {
+  return impl_->timing;
+}
 
 }  // namespace posed

@@ -10,9 +10,9 @@
 
 namespace posed {
 
-/// Tracks the camera, frame by frame, against a snapshot of the map. Never waits, takes no lock and, after the first frames, does not
-/// allocate; it is bounded in time by the number of features and landmarks. A function of its inputs alone: the same frames with the
-/// same snapshots give the same bits. Thread-bound: one thread calls `track`.
+/// Tracks the camera, frame by frame, against a snapshot of the map. Never waits, takes no lock and, after the first frames, does
+/// not allocate; it is bounded in time by the number of features and landmarks. A function of its inputs alone: the same frames
+/// with the same snapshots give the same bits. Thread-bound: one thread calls `track`.
 class Tracker {
  public:
   /// `T_map_camera_start`: the camera's pose in the map frame when a map begins.

@@ -13,8 +13,8 @@
 
 namespace posed {
 
-/// Random points, each with a descriptor of its own, seen by a camera without distortion: what the extractor would give of a perfect
-/// world, for tests of what comes after it. Index i of a view is point `seen[i]`.
+/// Random points, each with a descriptor of its own, seen by a camera without distortion: what the extractor would give of a
+/// perfect world, for tests of what comes after it. Index i of a view is point `seen[i]`.
 class FeatureWorld {
  public:
   struct View {
@@ -35,7 +35,8 @@ class FeatureWorld {
     }
   }
 
-  /// Features from `T_map_camera`: pixel noise of `pixel_sigma`, depth noise of `depth_sigma_m`, `flips` random bits of each descriptor.
+  /// Features from `T_map_camera`: pixel noise of `pixel_sigma`, depth noise of `depth_sigma_m`, `flips` random bits of each
+  /// descriptor.
   View view(const Se3& T_map_camera, double pixel_sigma = 0, double depth_sigma_m = 0, int flips = 10) {
     View v;
     v.T_map_camera = T_map_camera;
@@ -56,7 +57,8 @@ class FeatureWorld {
       Keypoint k;
       k.x = static_cast<float>(pixel.x());
       k.y = static_cast<float>(pixel.y());
-      k.level = static_cast<std::uint8_t>(std::clamp(static_cast<int>(std::lround(std::log(6.0 / p.norm()) / std::log(1.2))), 0, 7));
+      k.level =
+          static_cast<std::uint8_t>(std::clamp(static_cast<int>(std::lround(std::log(6.0 / p.norm()) / std::log(1.2))), 0, 7));
       Descriptor d = descriptors_[i];
       for (int f = 0; f < flips; ++f) {
         const std::uint64_t bit = generator_() % 256;

@@ -6,10 +6,9 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
-#include <iterator>
-
 #include <dlfcn.h>
 #include <execinfo.h>
+#include <iterator>
 #include <poll.h>
 #include <pthread.h>
 #include <time.h>
@@ -19,11 +18,11 @@
 
 // glibc's allocator under its other names, so that ours can stand before it without asking dlsym, which allocates.
 extern "C" {
-void* __libc_malloc(std::size_t);                     // NOLINT(bugprone-reserved-identifier): glibc's names
-void* __libc_calloc(std::size_t, std::size_t);        // NOLINT(bugprone-reserved-identifier)
-void* __libc_realloc(void*, std::size_t);             // NOLINT(bugprone-reserved-identifier)
-void* __libc_memalign(std::size_t, std::size_t);      // NOLINT(bugprone-reserved-identifier)
-void __libc_free(void*);                              // NOLINT(bugprone-reserved-identifier)
+void* __libc_malloc(std::size_t);                 // NOLINT(bugprone-reserved-identifier): glibc's names
+void* __libc_calloc(std::size_t, std::size_t);    // NOLINT(bugprone-reserved-identifier)
+void* __libc_realloc(void*, std::size_t);         // NOLINT(bugprone-reserved-identifier)
+void* __libc_memalign(std::size_t, std::size_t);  // NOLINT(bugprone-reserved-identifier)
+void __libc_free(void*);                          // NOLINT(bugprone-reserved-identifier)
 }
 
 namespace {
@@ -39,7 +38,8 @@ void* first_stack[32];
 
 void count(std::atomic<long>& counter) {
   const char* const* const end = watched_threads + watched_count.load(std::memory_order_acquire);
-  if (std::none_of(watched_threads + 0, end, [](const char* name) { return std::strcmp(name, posed::current_thread_name()) == 0; })) {
+  if (std::none_of(watched_threads + 0, end,
+                   [](const char* name) { return std::strcmp(name, posed::current_thread_name()) == 0; })) {
     return;
   }
   counter.fetch_add(1);
@@ -119,11 +119,11 @@ void free(void* p) {
   __libc_free(p);
 }
 
-#define POSED_FORWARD(counter, result, name, parameters, arguments)             \
-  result name parameters {                                                      \
-    static const auto original = next_symbol<result(*) parameters>(#name);      \
-    count(counter);                                               \
-    return original arguments;                                                  \
+#define POSED_FORWARD(counter, result, name, parameters, arguments)        \
+  result name parameters {                                                 \
+    static const auto original = next_symbol<result(*) parameters>(#name); \
+    count(counter);                                                        \
+    return original arguments;                                             \
   }
 
 POSED_FORWARD(locks, int, pthread_mutex_lock, (pthread_mutex_t * m), (m))
@@ -132,7 +132,8 @@ POSED_FORWARD(locks, int, pthread_rwlock_rdlock, (pthread_rwlock_t * l), (l))
 POSED_FORWARD(locks, int, pthread_rwlock_wrlock, (pthread_rwlock_t * l), (l))
 POSED_FORWARD(locks, int, pthread_cond_wait, (pthread_cond_t * c, pthread_mutex_t* m), (c, m))
 POSED_FORWARD(blocking_calls, int, nanosleep, (const timespec* t, timespec* left), (t, left))
-POSED_FORWARD(blocking_calls, int, clock_nanosleep, (clockid_t id, int flags, const timespec* t, timespec* left), (id, flags, t, left))
+POSED_FORWARD(blocking_calls, int, clock_nanosleep, (clockid_t id, int flags, const timespec* t, timespec* left),
+              (id, flags, t, left))
 POSED_FORWARD(blocking_calls, ssize_t, read, (int fd, void* p, std::size_t n), (fd, p, n))
 POSED_FORWARD(blocking_calls, ssize_t, write, (int fd, const void* p, std::size_t n), (fd, p, n))
 POSED_FORWARD(blocking_calls, int, poll, (pollfd * fds, nfds_t n, int timeout), (fds, n, timeout))

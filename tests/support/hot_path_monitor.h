@@ -13,8 +13,9 @@ struct HotPathCounts {
   std::string first_stack;  ///< where the first of them was called from: module(+offset) a line, for addr2line
 };
 
-/// Counts from now on what threads with these names (core/thread.h; at most four) do. The program's own malloc, pthread_mutex_lock and so on stand
-/// before the C library's, so whatever any library does on that thread is seen. Linking this file is what installs them.
+/// Counts from now on what threads with these names (core/thread.h; at most four) do. The program's own malloc, pthread_mutex_lock
+/// and so on stand before the C library's, so whatever any library does on that thread is seen. Linking this file is what installs
+/// them.
 void watch_hot_path(std::initializer_list<const char*> thread_names);
 
 /// Stops counting and returns the counts.

@@ -1,8 +1,8 @@
 #include <cstdlib>
 #include <mutex>
+#include <time.h>
 
 #include <gtest/gtest.h>
-#include <time.h>
 
 #include "config/config_loader.h"
 #include "core/thread.h"

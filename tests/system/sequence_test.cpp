@@ -23,8 +23,8 @@ struct Replayed {
 Replayed replay(std::vector<std::string> arguments) {
   const TemporaryFolder folder;
   arguments.insert(arguments.begin(), "replay");
-  for (const std::string& argument : {std::string("--lockstep"), std::string("--quiet"), std::string("--trajectory"), folder / "final.txt",
-                                      std::string("--online-trajectory"), folder / "online.txt"}) {
+  for (const std::string& argument : {std::string("--lockstep"), std::string("--quiet"), std::string("--trajectory"),
+                                      folder / "final.txt", std::string("--online-trajectory"), folder / "online.txt"}) {
     arguments.push_back(argument);
   }
   std::ostringstream out;

@@ -42,9 +42,9 @@ std::string sequence_text(const SequenceMonitor& sequence) {
 }
 
 std::string health_table(const HealthReport& health) {
-  return fmt::format("frames     captured {}  tracked {}  lost {}  dropped {}  missed {}  no slot {}  skipped {}\n", health.frames_captured,
-                     health.frames_tracked, health.frames_lost, health.frames_dropped, health.frames_missed, health.frames_no_slot,
-                     health.frames_skipped) +
+  return fmt::format("frames     captured {}  tracked {}  lost {}  dropped {}  missed {}  no slot {}  skipped {}\n",
+                     health.frames_captured, health.frames_tracked, health.frames_lost, health.frames_dropped, health.frames_missed,
+                     health.frames_no_slot, health.frames_skipped) +
          fmt::format("map        {} keyframes  {} landmarks\n", health.map_keyframes, health.map_landmarks) +
          fmt::format("poses      published {}  dropped {}  errors {}\n", health.poses_published, health.poses_dropped,
                      health.publish_errors) +

@@ -1,5 +1,6 @@
-// What follows the extractor in a tracked frame: placing features, matching the local map, solving for the pose. The world is made of
-// random points with random descriptors (tests/support/feature_world.h), about 1,000 of them in view as in a frame of 1,000 features.
+// What follows the extractor in a tracked frame: placing features, matching the local map, solving for the pose. The world is made
+// of random points with random descriptors (tests/support/feature_world.h), about 1,000 of them in view as in a frame of 1,000
+// features.
 #include <benchmark/benchmark.h>
 
 #include "slam/local_mapper.h"
@@ -35,7 +36,8 @@ struct Scene {
     std::vector<ProjectedLandmark> projected;
     for (std::uint32_t l = 0; l < map.landmarks.size(); ++l) {
       ProjectedLandmark p;
-      if (matcher.project(map, l, T_camera_map.rotation_matrix().cast<float>(), T_camera_map.translation().cast<float>(), frame, p)) {
+      if (matcher.project(map, l, T_camera_map.rotation_matrix().cast<float>(), T_camera_map.translation().cast<float>(), frame,
+                          p)) {
         projected.push_back(p);
       }
     }

@@ -57,7 +57,8 @@ class FakeSource final : public RgbdSource {
     pool_ = &pool;
     std::optional<FrameWriter> slot = pool.acquire();
     if (start_status_ && slot) {
-      decoded_ahead_ = std::move(*slot).share();  // as a source does that decodes ahead: the pool must be there when this is given back
+      decoded_ahead_ =
+          std::move(*slot).share();  // as a source does that decodes ahead: the pool must be there when this is given back
     }
     return start_status_;
   }

@@ -10,7 +10,9 @@
 namespace posed {
 namespace {
 
-Se3 shifted(double x, double yaw_rad = 0) { return Se3::exp((Vector6d() << 0, yaw_rad, 0, x, 0, 0).finished()); }
+Se3 shifted(double x, double yaw_rad = 0) {
+  return Se3::exp((Vector6d() << 0, yaw_rad, 0, x, 0, 0).finished());
+}
 
 struct LocalMapperTest : testing::Test {
   FeatureWorld world{1};

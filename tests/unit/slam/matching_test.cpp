@@ -35,7 +35,8 @@ struct MatchingTest : testing::Test {
     std::vector<ProjectedLandmark> projected;
     for (std::uint32_t l = 0; l < map.landmarks.size(); ++l) {
       ProjectedLandmark p;
-      if (matcher.project(map, l, T_camera_map.rotation_matrix().cast<float>(), T_camera_map.translation().cast<float>(), frame, p)) {
+      if (matcher.project(map, l, T_camera_map.rotation_matrix().cast<float>(), T_camera_map.translation().cast<float>(), frame,
+                          p)) {
         projected.push_back(p);
       }
     }

@@ -36,7 +36,9 @@ struct Scene {
   }
 };
 
-Vector6d error_of(const Se3& truth, const Se3& estimate) { return (estimate.inverse() * truth).log(); }
+Vector6d error_of(const Se3& truth, const Se3& estimate) {
+  return (estimate.inverse() * truth).log();
+}
 
 const Vector6d kFarStart = (Vector6d() << 0.05, -0.05, 0.03, 0.05, 0.1, -0.08).finished();
 

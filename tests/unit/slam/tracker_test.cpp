@@ -49,7 +49,8 @@ class Rig {
     return estimate;
   }
   PoseEstimate track(std::uint64_t index, Mapping mapping = Mapping::AtOnce) {
-    return track(index, [](RgbdFrame&) {}, mapping);
+    return track(
+        index, [](RgbdFrame&) {}, mapping);
   }
 
   /// Distance [m] between the estimate and the truth, with the first camera as the map's frame.
