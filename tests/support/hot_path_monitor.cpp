@@ -9,6 +9,7 @@
 #include <dlfcn.h>
 #include <execinfo.h>
 #include <iterator>
+#include <span>
 #include <poll.h>
 #include <pthread.h>
 #include <time.h>
@@ -37,8 +38,8 @@ std::atomic<int> first_depth{0};
 void* first_stack[32];
 
 void count(std::atomic<long>& counter) {
-  const char* const* const end = watched_threads + watched_count.load(std::memory_order_acquire);
-  if (std::none_of(watched_threads + 0, end,
+  const std::span<const char* const> watched(watched_threads, watched_count.load(std::memory_order_acquire));
+  if (std::none_of(watched.begin(), watched.end(),
                    [](const char* name) { return std::strcmp(name, posed::current_thread_name()) == 0; })) {
     return;
   }

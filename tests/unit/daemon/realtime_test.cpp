@@ -41,6 +41,7 @@ class RealtimeTest : public ::testing::Test {
       return FakeSource::recording(kWarmUpFrames + kCountedFrames + 1)(call);
     });
     auto tracker = std::make_unique<FakeTracker>();
+    tracker->keyframe_interval = 1;  // of the frames that get through, whichever they are
     tracker->on_frame = [this](const RgbdFrame& frame) {
       during_tracking_(frame);
       newest_tracked_ = frame.sequence;
