@@ -1,6 +1,5 @@
-// What follows the extractor in a tracked frame: placing features, matching the local map, solving for the pose. The world is made
-// of random points with random descriptors (tests/support/feature_world.h), about 1,000 of them in view as in a frame of 1,000
-// features.
+// What follows the extractor in a tracked frame: placing features, matching the local map, solving for the pose. The world is made of
+// random points with random descriptors (tests/support/feature_world.h); some 2,200 are in view, twice what a frame of 1,000 features has.
 #include <benchmark/benchmark.h>
 
 #include "slam/local_mapper.h"
@@ -13,7 +12,7 @@ namespace posed {
 namespace {
 
 struct Scene {
-  FeatureWorld world{1, 2900};
+  FeatureWorld world{1, 6500};
   TrackerConfig config = [] {
     TrackerConfig t;
     t.close_depth_m = 10;
