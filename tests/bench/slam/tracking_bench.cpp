@@ -1,5 +1,6 @@
-// What follows the extractor in a tracked frame: placing features, matching the local map, solving for the pose. The world is made of
-// random points with random descriptors (tests/support/feature_world.h); some 2,200 are in view, twice what a frame of 1,000 features has.
+// What follows the extractor in a tracked frame: placing features, matching the local map, solving for the pose. The world is made
+// of random points with random descriptors (tests/support/feature_world.h); some 2,200 are in view, twice what a frame of 1,000
+// features has.
 #include <benchmark/benchmark.h>
 
 #include "slam/local_mapper.h"
