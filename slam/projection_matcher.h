@@ -40,6 +40,22 @@ class ProjectionMatcher {
   bool project(const MapSnapshot& map, std::uint32_t landmark, const Eigen::Matrix3f& R_camera_map,
                const Eigen::Vector3f& t_camera_map, const FeatureFrame& frame, ProjectedLandmark& projected) const;
 
+  /// Replaces `projected` by the landmarks that `wanted(index)` asks for and that `project` finds in view from `T_map_camera`.
+  template <typename Wanted>
+  void project_where(const MapSnapshot& map, const Se3& T_map_camera, const FeatureFrame& frame, Wanted&& wanted,
+                     std::vector<ProjectedLandmark>& projected) const {
+    const Se3 T_camera_map = T_map_camera.inverse();
+    const Eigen::Matrix3f R_camera_map = T_camera_map.rotation_matrix().cast<float>();
+    const Eigen::Vector3f t_camera_map = T_camera_map.translation().cast<float>();
+    projected.clear();
+    for (std::uint32_t l = 0; l < map.landmarks.size(); ++l) {
+      ProjectedLandmark p;
+      if (wanted(l) && project(map, l, R_camera_map, t_camera_map, frame, p)) {
+        projected.push_back(p);
+      }
+    }
+  }
+
   /// Matches `projected` to keypoints whose entry in `landmark_of` is kUnmatched, and writes the landmark's index there; a keypoint
   /// that several landmarks want goes to the nearest descriptor. Returns the number of new matches.
   int match(const MapSnapshot& map, std::span<const ProjectedLandmark> projected, const FeatureFrame& frame,

@@ -123,22 +123,15 @@ void Tracker::Impl::initialize(const KeyframeRecord* candidate) {
 }
 
 void Tracker::Impl::match_last_frame(const MapSnapshot& map, const Se3& T_map_camera, float radius) {
-  const Se3 T_camera_map = T_map_camera.inverse();
-  const Eigen::Matrix3f R = T_camera_map.rotation_matrix().cast<float>();
-  const Eigen::Vector3f t = T_camera_map.translation().cast<float>();
-  projected.clear();
   // Both lists ascend, so one walk finds the landmarks that are still in the snapshot. After a map's first frame all are as good.
   std::size_t next = 0;
-  for (std::uint32_t l = 0; l < map.landmarks.size(); ++l) {
+  const auto was_tracked = [&](std::uint32_t l) {
     while (next < last_landmarks.size() && last_landmarks[next] < map.landmarks[l].id) {
       ++next;
     }
-    const bool tracked = last_landmarks.empty() || (next < last_landmarks.size() && last_landmarks[next] == map.landmarks[l].id);
-    ProjectedLandmark p;
-    if (tracked && matcher.project(map, l, R, t, frame, p)) {
-      projected.push_back(p);
-    }
-  }
+    return last_landmarks.empty() || (next < last_landmarks.size() && last_landmarks[next] == map.landmarks[l].id);
+  };
+  matcher.project_where(map, T_map_camera, frame, was_tracked, projected);
   landmark_of.assign(frame.size(), kUnmatched);
   MatchOptions options;
   options.radius = radius;
@@ -147,22 +140,14 @@ void Tracker::Impl::match_last_frame(const MapSnapshot& map, const Se3& T_map_ca
 
 /// Adds matches with the landmarks of the local map that have none yet.
 void Tracker::Impl::match_local_map(const MapSnapshot& map, const Se3& T_map_camera) {
-  const Se3 T_camera_map = T_map_camera.inverse();
-  const Eigen::Matrix3f R = T_camera_map.rotation_matrix().cast<float>();
-  const Eigen::Vector3f t = T_camera_map.translation().cast<float>();
   landmark_taken.assign(map.landmarks.size(), 0);
   for (const std::int32_t landmark : landmark_of) {
     if (landmark != kUnmatched) {
       landmark_taken[static_cast<std::size_t>(landmark)] = 1;
     }
   }
-  projected.clear();
-  for (std::uint32_t l = 0; l < map.landmarks.size(); ++l) {
-    ProjectedLandmark p;
-    if (landmark_taken[l] == 0 && matcher.project(map, l, R, t, frame, p)) {
-      projected.push_back(p);
-    }
-  }
+  const auto is_free = [&](std::uint32_t l) { return landmark_taken[l] == 0; };
+  matcher.project_where(map, T_map_camera, frame, is_free, projected);
   MatchOptions options;
   options.radius = kLocalMapRadius;
   matches += matcher.match(map, projected, frame, options, landmark_of);

@@ -32,15 +32,9 @@ struct Scene {
   }
 
   std::vector<ProjectedLandmark> project(const ProjectionMatcher& matcher) const {
-    const Se3 T_camera_map = T_map_camera.inverse();
     std::vector<ProjectedLandmark> projected;
-    for (std::uint32_t l = 0; l < map.landmarks.size(); ++l) {
-      ProjectedLandmark p;
-      if (matcher.project(map, l, T_camera_map.rotation_matrix().cast<float>(), T_camera_map.translation().cast<float>(), frame,
-                          p)) {
-        projected.push_back(p);
-      }
-    }
+    matcher.project_where(
+        map, T_map_camera, frame, [](std::uint32_t) { return true; }, projected);
     return projected;
   }
 };

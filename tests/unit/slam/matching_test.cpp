@@ -31,15 +31,9 @@ struct MatchingTest : testing::Test {
   }
 
   std::vector<ProjectedLandmark> project_all(const FeatureFrame& frame, const Se3& pose) const {
-    const Se3 T_camera_map = pose.inverse();
     std::vector<ProjectedLandmark> projected;
-    for (std::uint32_t l = 0; l < map.landmarks.size(); ++l) {
-      ProjectedLandmark p;
-      if (matcher.project(map, l, T_camera_map.rotation_matrix().cast<float>(), T_camera_map.translation().cast<float>(), frame,
-                          p)) {
-        projected.push_back(p);
-      }
-    }
+    matcher.project_where(
+        map, pose, frame, [](std::uint32_t) { return true; }, projected);
     return projected;
   }
 
