@@ -16,7 +16,7 @@ struct Receiver {
   std::int64_t disordered = 0;
   std::int64_t next_sequence = 0;
 
-  void on_pose(const lcm::ReceiveBuffer*, const std::string&, const posed::pose_t* pose) {
+  void take(const posed::pose_t* pose) {
     ++received;
     if (pose->sequence < next_sequence) {
       ++disordered;
@@ -42,7 +42,10 @@ int main(int argc, char** argv) {
     return 69;
   }
   Receiver receiver;
-  lcm.subscribe(argv[2], &Receiver::on_pose, &receiver)->setQueueCapacity(0);  // 0: as many as come
+  // Not a member: gcc 12 with its sanitizers miscompiles the member pointer that lcm-cpp keeps.
+  void (*on_pose)(const lcm::ReceiveBuffer*, const std::string&, const posed::pose_t*, Receiver*) =
+      [](const lcm::ReceiveBuffer*, const std::string&, const posed::pose_t* pose, Receiver* self) { self->take(pose); };
+  lcm.subscribeFunction(argv[2], on_pose, &receiver)->setQueueCapacity(0);  // 0: as many as come
   std::puts("ready");
   std::fflush(stdout);
   while (receiver.received < count && lcm.handleTimeout(kSilenceMs) > 0) {

@@ -160,9 +160,12 @@ TEST(LcmTransport, DeliversWithinTheProcessOverMemq) {
 
   struct Receiver {
     std::vector<std::int64_t> sequences;
-    void on_pose(const lcm::ReceiveBuffer*, const std::string&, const pose_t* message) { sequences.push_back(message->sequence); }
+    // Not a member: gcc 12 with its sanitizers miscompiles the member pointer that lcm-cpp keeps.
+    static void on_pose(const lcm::ReceiveBuffer*, const std::string&, const pose_t* message, Receiver* self) {
+      self->sequences.push_back(message->sequence);
+    }
   } receiver;
-  transport.handle()->subscribe("T_POSE", &Receiver::on_pose, &receiver);
+  transport.handle()->subscribeFunction("T_POSE", &Receiver::on_pose, &receiver);
   PoseEstimate estimate;
   for (estimate.sequence = 0; estimate.sequence < 3; ++estimate.sequence) {
     publisher.publish(estimate, 0);
