@@ -27,7 +27,8 @@ class BundleAdjuster {
   /// depth.
   ///
   /// An interrupt is honoured within a fraction of an iteration. The problem then holds the result of the last accepted step, and
-  /// the flags of the last round that ended; every accepted step has lowered its round's cost.
+  /// every accepted step has lowered its round's cost. The flags are always those of the poses and points that are returned, so
+  /// after an early interrupt they also condemn what further steps might have mended.
   BundleSummary solve(BundleProblem& problem, const BundleOptions& options, const Interrupt& interrupt = {});
 
  private:

@@ -28,7 +28,8 @@ struct BundleObservation {
   double disparity = 0;                                   ///< baseline_fx / depth [pixels]; 0 where the sensor saw no depth
   double pixel_weight = 1;                                ///< 1 / variance of each pixel coordinate
   double disparity_weight = 1;                            ///< 1 / variance of the disparity
-  bool inlier = true;  ///< read: takes part in the first round; result: chi-squared below the 95 % bound at the solution
+  bool inlier = true;                                     ///< read: takes part in the first round; result: chi-squared below
+                                                          ///< the 95 % bound
 };
 
 /// Poses, points and what the cameras saw of the points. A value: it knows nothing of the map it was taken from.
@@ -46,16 +47,16 @@ struct BundleProblem {
 };
 
 struct BundleOptions {
-  int max_iterations = 10;      ///< a round; iterations whose step is refused count too
-  int rounds = 2;               ///< of minimising and telling inliers from outliers; Huber's kernel acts in all but the last
-  double cost_tolerance = 1e-6; ///< a step that lowers the cost by a smaller share ends its round
+  int max_iterations = 10;       ///< a round; iterations whose step is refused count too
+  int rounds = 2;                ///< of minimising and telling inliers from outliers; Huber's kernel acts in all but the last
+  double cost_tolerance = 1e-6;  ///< a step that lowers the cost by a smaller share ends its round
 };
 
 enum class BundleOutcome {
   Converged,       ///< the last round ended because its steps had become negligible
   IterationLimit,  ///< the last round ended at max_iterations
   Interrupted,     ///< the caller asked to stop
-  Degenerate,      ///< no observation to adjust to, or no step that lowers the cost of the first round could be computed
+  Degenerate,      ///< a round had no observation to adjust to, or equations that no damping made solvable
 };
 
 struct BundleSummary {
