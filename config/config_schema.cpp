@@ -149,18 +149,34 @@ void add_tracker(SchemaBuilder& schema, TrackerConfig& c) {
            "A pose that fewer landmarks agree with is not trusted and the state becomes lost. Less than `features`.")
       .key("keyframe_max_interval", integer(c.keyframe_max_interval, 1, 1000), "frames", "A keyframe is made at least this often.")
       .key("keyframe_inlier_ratio", real(c.keyframe_inlier_ratio, 0.1, 1.0), "",
-           "A keyframe is made when less than this share of the reference keyframe's landmarks is seen.");
+           "A keyframe is made when less than this share of the reference keyframe's landmarks is seen.")
+      .key("new_map_after_s", real(c.new_map_after_s, 0.1, 1e6), "s",
+           "Lost for so long, the tracker begins a new map; it is joined with the old one when they meet.");
 }
 
 void add_mapper(SchemaBuilder& schema, MapperConfig& c) {
   schema.section("mapper", "The map of keyframes and landmarks.")
-      .key("max_keyframes", integer(c.max_keyframes, 2, 10000), "keyframes", "Keyframes kept in the map.")
+      .key("max_keyframes", integer(c.max_keyframes, 2, 10000), "keyframes",
+           "Keyframes kept, about 150 kB each with their landmarks; of more, those go that tell least.")
+      .key("max_landmarks", integer(c.max_landmarks, 1000, 5'000'000), "landmarks",
+           "Landmarks kept; of more, those go that were seen least.")
       .key("local_landmarks", integer(c.local_landmarks, 100, 50000), "landmarks",
            "Most landmarks of the local map that the tracker matches against.")
       .key("local_keyframes", integer(c.local_keyframes, 1, 1000), "keyframes",
            "Keyframes whose landmarks make the local map. At most `max_keyframes`.")
       .key("recovery_keyframes", integer(c.recovery_keyframes, 1, 1000), "keyframes",
-           "Recent keyframes that a lost tracker matches against. At most `max_keyframes`.");
+           "Keyframes of the local map that a lost tracker matches against at once. At most `max_keyframes`.")
+      .key("bundle_keyframes", integer(c.bundle_keyframes, 0, 200), "keyframes",
+           "Keyframes that a local bundle adjustment moves. 0: none is made.")
+      .key("bundle_iterations", integer(c.bundle_iterations, 1, 50), "iterations",
+           "Most iterations of a local bundle adjustment, in each of its two rounds.")
+      .key("bundle_budget_s", real(c.bundle_budget_s, 0.001, 10.0), "s",
+           "A local bundle adjustment is given up after this time, or when a keyframe waits. It keeps what it has reached. Without "
+           "effect in lockstep.")
+      .key("loop_closing", BoolField{&c.loop_closing}, "", "Look for places that were seen before, and correct the map by them.")
+      .key("loop_max_drift", real(c.loop_max_drift, 0.001, 1.0), "",
+           "Largest drift to be believed, as a share of the path travelled since the place was seen: a closure that asks for more "
+           "is taken for a place that looks alike, and refused.");
 }
 
 void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {

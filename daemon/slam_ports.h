@@ -8,6 +8,7 @@
 #include "core/rgbd_frame.h"
 #include "slam/keyframe_record.h"
 #include "slam/map_snapshot.h"
+#include "slam/mapper.h"
 
 namespace posed {
 
@@ -19,15 +20,17 @@ class FrameTracker {
   virtual PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) = 0;
 };
 
-/// The mapper as the pipeline sees it (slam/local_mapper.h). Thread-bound.
+/// The mapper as the pipeline sees it (slam/mapper.h). Thread-bound.
 class KeyframeMapper {
  public:
   virtual ~KeyframeMapper() = default;
   virtual void insert(const KeyframeRecord& record) = 0;
+  virtual bool improve(const Interrupt& interrupt) = 0;
   virtual void write_snapshot(MapSnapshot& snapshot) const = 0;
   virtual std::optional<Se3> keyframe_pose(KeyframeId id) const = 0;
   virtual std::size_t keyframe_count() const = 0;
   virtual std::size_t landmark_count() const = 0;
+  virtual MapperCounters counters() const = 0;
 };
 
 /// The real ones. Reentrant.

@@ -7,8 +7,8 @@
 
 namespace posed {
 
-/// Remembers where keyframes are that a map has dropped, relative to one that it kept, so that a trajectory can be rebuilt after the
-/// map has moved. Bounded: the oldest are forgotten first. Thread-bound.
+/// Remembers where keyframes are that a map has dropped, relative to one that it kept, so that a trajectory can be rebuilt after
+/// the map has moved. Bounded: the oldest are forgotten first. Thread-bound.
 class DroppedKeyframes {
  public:
   /// Call before the keyframe is removed; `anchor` stays in the map for now.

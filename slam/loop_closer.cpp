@@ -12,24 +12,24 @@ namespace posed {
 
 namespace {
 
-constexpr std::size_t kCandidates = 3;      // verified for a keyframe
-constexpr int kMinInliers = 40;             // landmarks that a match must rest on
-constexpr double kMinCovered = 0.1;         // of the image's cells, so that one poster does not make a place
-constexpr std::size_t kAgreeing = 3;        // keyframes that must ask for the same correction...
-constexpr std::uint64_t kWithin = 6;        // ...among so many in a row
-constexpr double kAgreement_m = 0.15;       // how far their corrections may differ
+constexpr std::size_t kCandidates = 3;  // verified for a keyframe
+constexpr int kMinInliers = 40;         // landmarks that a match must rest on
+constexpr double kMinCovered = 0.1;     // of the image's cells, so that one poster does not make a place
+constexpr std::size_t kAgreeing = 3;    // keyframes that must ask for the same correction...
+constexpr std::uint64_t kWithin = 6;    // ...among so many in a row
+constexpr double kAgreement_m = 0.15;   // how far their corrections may differ
 constexpr double kAgreement_rad = 0.07;
-constexpr double kDriftFloor_m = 0.2;       // always plausible
+constexpr double kDriftFloor_m = 0.2;  // always plausible
 constexpr double kDriftFloor_rad = 0.1;
-constexpr double kDriftRate_rad_m = 0.05;   // of the path
-constexpr double kShortestLoop_m = 1.5;     // path between two keyframes for a loop to be worth closing
+constexpr double kDriftRate_rad_m = 0.05;     // of the path
+constexpr double kShortestLoop_m = 1.5;       // path between two keyframes for a loop to be worth closing
 constexpr std::size_t kAroundKeyframes = 10;  // whose landmarks a candidate is verified against
 constexpr std::size_t kAroundLandmarks = 3000;
-constexpr int kEssentialShared = 100;       // landmarks that make an edge of the essential graph
+constexpr int kEssentialShared = 100;  // landmarks that make an edge of the essential graph
 constexpr int kPoseGraphIterations = 30;
 constexpr std::size_t kFusedNeighbours = 10;
-constexpr float kFusionRadius = 6.0F;       // [pixels on level 0]: the pose graph leaves more than noise
-constexpr double kEdgeSigma_rad = 0.005;    // of a pose relative to a neighbour; all edges alike
+constexpr float kFusionRadius = 6.0F;     // [pixels on level 0]: the pose graph leaves more than noise
+constexpr double kEdgeSigma_rad = 0.005;  // of a pose relative to a neighbour; all edges alike
 constexpr double kEdgeSigma_m = 0.01;
 
 Matrix6d edge_information() {
@@ -190,8 +190,8 @@ bool LoopCloser::is_plausible(const Detection& detection) const {
 bool LoopCloser::is_agreed(const Detection& detection) {
   const auto correction = [&](const Detection& d) {
     // The keyframe may have been adjusted since: its pose relative to this one counts.
-    return d.match.T_map_camera * (map_.find_keyframe(d.keyframe)->T_map_camera.inverse() *
-                                   map_.find_keyframe(detection.keyframe)->T_map_camera);
+    return d.match.T_map_camera *
+           (map_.find_keyframe(d.keyframe)->T_map_camera.inverse() * map_.find_keyframe(detection.keyframe)->T_map_camera);
   };
   std::size_t agreeing = 1;
   for (const Detection& earlier : recent_) {
@@ -207,8 +207,7 @@ bool LoopCloser::is_agreed(const Detection& detection) {
 
 Result<LoopCorrection> LoopCloser::correct_loop(const Detection& detection) {
   Keyframe& k = *map_.find_keyframe(detection.keyframe);
-  const Se3 T_keyframe_matched =
-      detection.match.T_map_camera.inverse() * map_.find_keyframe(detection.matched)->T_map_camera;
+  const Se3 T_keyframe_matched = detection.match.T_map_camera.inverse() * map_.find_keyframe(detection.matched)->T_map_camera;
   EssentialGraph essential(map_, k.map_id);
   essential.add(detection.keyframe, detection.matched, T_keyframe_matched, edge_information());
   const Result<PoseGraphSummary> solved = optimize_pose_graph(essential.graph(), kPoseGraphIterations);
@@ -226,8 +225,7 @@ Result<LoopCorrection> LoopCloser::correct_loop(const Detection& detection) {
 
 LoopCorrection LoopCloser::join_maps(const Detection& detection) {
   Keyframe& k = *map_.find_keyframe(detection.keyframe);
-  const Se3 T_keyframe_matched =
-      detection.match.T_map_camera.inverse() * map_.find_keyframe(detection.matched)->T_map_camera;
+  const Se3 T_keyframe_matched = detection.match.T_map_camera.inverse() * map_.find_keyframe(detection.matched)->T_map_camera;
   const Se3 T_matched_map_own_map = detection.match.T_map_camera * k.T_map_camera.inverse();
   map_.join(k.map_id, detection.matched_map, T_matched_map_own_map);
   k.loops.push_back({detection.matched, T_keyframe_matched, edge_information()});

@@ -19,8 +19,8 @@ namespace posed {
 
 /// What a closed loop or a joining of two maps did.
 struct LoopCorrection {
-  bool joined_maps = false;    ///< else a loop within one map
-  Se3 T_corrected_previous;    ///< what the newest keyframe's pose was moved by: T_map_camera = this * its former T_map_camera
+  bool joined_maps = false;  ///< else a loop within one map
+  Se3 T_corrected_previous;  ///< what the newest keyframe's pose was moved by: T_map_camera = this * its former T_map_camera
   KeyframeId keyframe = kNoKeyframe;
   KeyframeId matched = kNoKeyframe;
   double correction_m = 0;  ///< by how far the keyframe moved
@@ -34,17 +34,17 @@ struct LoopCounters {
   std::uint64_t joined = 0;
 };
 
-/// Finds out that the camera is at a place it has seen before, and corrects the map by it. A closure needs: candidates by appearance
-/// (PlaceRecognizer); agreement in geometry (PlaceVerifier); a correction that the path travelled since explains; and the same
-/// correction from `kAgreeing` keyframes of the last few. Thread-bound to the mapper.
+/// Finds out that the camera is at a place it has seen before, and corrects the map by it. A closure needs: candidates by
+/// appearance (PlaceRecognizer); agreement in geometry (PlaceVerifier); a correction that the path travelled since explains; and
+/// the same correction from `kAgreeing` keyframes of the last few. Thread-bound to the mapper.
 class LoopCloser {
  public:
   /// Everything passed in must outlive it.
   LoopCloser(const TrackerConfig& tracker, const MapperConfig& config, const LandmarkEstimator& estimator, LocalMapper& mapper,
              PlaceRecognizer& places, Map& map);
 
-  /// Looks for an earlier place in what `keyframe`, the newest, shows, and corrects the map where it is sure of one. The caller should
-  /// adjust the whole map afterwards. Errors: of the pose graph; the map is unchanged then.
+  /// Looks for an earlier place in what `keyframe`, the newest, shows, and corrects the map where it is sure of one. The caller
+  /// should adjust the whole map afterwards. Errors: of the pose graph; the map is unchanged then.
   Result<std::optional<LoopCorrection>> close(KeyframeId keyframe);
 
   const LoopCounters& counters() const { return counters_; }

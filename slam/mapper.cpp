@@ -77,9 +77,9 @@ struct Mapper::Impl {
 
   std::uint64_t version = 0;
   std::uint32_t newest_map_id = 0;
-  KeyframeId newest = kNoKeyframe;    // last one taken in
+  KeyframeId newest = kNoKeyframe;       // last one taken in
   KeyframeId newest_seen = kNoKeyframe;  // last one handed over, visits of a map that stays as it is included
-  KeyframeId centre = kNoKeyframe;    // of the local map
+  KeyframeId centre = kNoKeyframe;       // of the local map
   KeyframeId anchor = kNoKeyframe;
   Se3 T_map_odom;
   RelocalizationAnswer relocalization;
@@ -156,8 +156,8 @@ void Mapper::Impl::insert_keyframe(const KeyframeRecord& record) {
 /// A keyframe inherits the drift of the best keyframe that shares enough of its landmarks.
 void Mapper::Impl::renew_anchor(const Matrix6d& given_map) {
   Keyframe& keyframe = *map.find_keyframe(newest);
-  const auto seen = std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(),
-                                  [](LandmarkId id) { return id != kNoLandmark; });
+  const auto seen =
+      std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(), [](LandmarkId id) { return id != kNoLandmark; });
   anchor = newest;
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [id, shared] : keyframe.covisible) {
@@ -185,7 +185,8 @@ void Mapper::Impl::visit(const KeyframeRecord& record) {
       }
     }
   }
-  const auto best = std::max_element(seen_by.begin(), seen_by.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  const auto best =
+      std::max_element(seen_by.begin(), seen_by.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   if (best != seen_by.end()) {
     centre = best->first;
     anchor = centre;
@@ -254,7 +255,7 @@ void Mapper::Impl::close_loop() {
   if (const std::optional<LoopCorrection>& correction = *closed) {
     T_map_odom = correction->T_corrected_previous * T_map_odom;
     log_info("{} at keyframe {} with keyframe {}: corrected by {:.3f} m", correction->joined_maps ? "maps joined" : "loop closed",
-               correction->keyframe, correction->matched, correction->correction_m);
+             correction->keyframe, correction->matched, correction->correction_m);
     adjust_pending = config.bundle_keyframes > 0;
     full_pending = adjust_pending;
   }
@@ -262,8 +263,7 @@ void Mapper::Impl::close_loop() {
 
 void Mapper::Impl::adjust_all(const Interrupt& interrupt) {
   const Se3 before = map.find_keyframe(newest)->T_map_camera;
-  const BundleSummary summary =
-      local.adjuster().adjust_all(map, map.find_keyframe(newest)->map_id, kFullIterations, interrupt);
+  const BundleSummary summary = local.adjuster().adjust_all(map, map.find_keyframe(newest)->map_id, kFullIterations, interrupt);
   follow_newest(before);
   full_pending = summary.outcome == BundleOutcome::Interrupted;
 }

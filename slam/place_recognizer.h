@@ -24,9 +24,9 @@ struct PlaceCandidate {
 /// Finds keyframes that look like a query, by an inverted index of binary descriptors that needs no trained vocabulary: locality
 /// sensitive hashing by bit sampling (Gionis, Indyk, Motwani, "Similarity search in high dimensions via hashing", VLDB 1999) with
 /// every bucket one bit away probed too (Lv et al., "Multi-probe LSH", VLDB 2007). A posting carries 64 further bits of its
-/// descriptor, which tell true neighbours from those that merely share the bucket (Jegou, Douze, Schmid, "Hamming embedding and weak
-/// geometric consistency for large scale image search", ECCV 2008). Each query descriptor gives each keyframe one vote, weighted by
-/// closeness and by the logarithm of how few keyframes it reaches (Sivic, Zisserman, "Video Google", ICCV 2003).
+/// descriptor, which tell true neighbours from those that merely share the bucket (Jegou, Douze, Schmid, "Hamming embedding and
+/// weak geometric consistency for large scale image search", ECCV 2008). Each query descriptor gives each keyframe one vote,
+/// weighted by closeness and by the logarithm of how few keyframes it reaches (Sivic, Zisserman, "Video Google", ICCV 2003).
 ///
 /// Results depend on what is in the index alone, not on the order in which it came: votes are integers, ties go to the smaller id.
 /// Thread-bound.
@@ -52,8 +52,8 @@ class PlaceRecognizer {
   /// Memory held [bytes], capacity that waits for reuse included.
   std::size_t memory_bytes() const;
 
-  /// Replaces `candidates` by at most `max_candidates` keyframes for which `eligible` holds, best first. Keyframes that share nothing
-  /// with the query are never among them.
+  /// Replaces `candidates` by at most `max_candidates` keyframes for which `eligible` holds, best first. Keyframes that share
+  /// nothing with the query are never among them.
   void query(std::span<const Descriptor> descriptors, std::size_t max_candidates, const std::function<bool(KeyframeId)>& eligible,
              std::vector<PlaceCandidate>& candidates) const;
 

@@ -23,7 +23,8 @@ Relocalizer::Relocalizer(const TrackerConfig& tracker, const PinholeCamera& came
       frame_(camera, feature_capacity(tracker.features)) {}
 
 std::optional<Relocalizer::Found> Relocalizer::find(const KeyframeRecord& frame) {
-  places_.query(frame.features.descriptors, kCandidates, [](KeyframeId) { return true; }, candidates_);
+  places_.query(
+      frame.features.descriptors, kCandidates, [](KeyframeId) { return true; }, candidates_);
   frame_.place_stored(camera_, frame.features, frame.ideal_pixels, frame.depth_m);
   std::optional<Found> best;
   int best_inliers = 0;

@@ -128,17 +128,20 @@ class FakeTracker final : public FrameTracker {
 class FakeMapper final : public KeyframeMapper {
  public:
   std::function<void()> on_insert = [] {};
+  std::function<bool(const Interrupt&)> on_improve = [](const Interrupt&) { return false; };
 
   void insert(const KeyframeRecord& record) override {
     on_insert();
     keyframes_.push_back(record.id);
   }
+  bool improve(const Interrupt& interrupt) override { return on_improve(interrupt); }
   void write_snapshot(MapSnapshot& snapshot) const override { snapshot.version = keyframes_.size(); }
   std::optional<Se3> keyframe_pose(KeyframeId id) const override {
     return id <= keyframes_.size() ? std::optional<Se3>(Se3()) : std::nullopt;
   }
   std::size_t keyframe_count() const override { return keyframes_.size(); }
   std::size_t landmark_count() const override { return 7 * keyframes_.size(); }
+  MapperCounters counters() const override { return {}; }
 
  private:
   std::vector<KeyframeId> keyframes_;
