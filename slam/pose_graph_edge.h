@@ -6,8 +6,7 @@
 namespace posed::pose_graph {
 
 /// J_r(xi)^-1 of SE(3), with log(T * exp(d)) = log(T) + J_r^-1(log(T)) d to first order: the Bernoulli series in ad(xi) (Barfoot,
-/// 2017, equation 7.95 for the left one; the right one is its value at -xi), cut off after the sixth power. Relative error 1e-6 at
-/// half a radian.
+/// 2017, section 7.1.5, has the left one; the right one is its value at -xi), cut off before its term -ad^8 / 1209600.
 Matrix6d right_jacobian_inverse(const Vector6d& xi);
 
 struct EdgeTerms {
