@@ -9,6 +9,7 @@ posed_build_packages=(
   "pkg-config|finds libraries"
   "libopencv-core-dev|image type and universal intrinsics (SIMD)"
   "libeigen3-dev|linear algebra"
+  "libceres-dev|pose graphs: non-linear least squares"
   "libspng-dev|PNG decoding and encoding"
   "libturbojpeg0-dev|JPEG decoding"
   "liblcm-dev|LCM, the message transport"
