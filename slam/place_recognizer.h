@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -24,15 +25,15 @@ struct PlaceCandidate {
 /// Finds keyframes that look like a query, by an inverted index of binary descriptors that needs no trained vocabulary: locality
 /// sensitive hashing by bit sampling (Gionis, Indyk, Motwani, "Similarity search in high dimensions via hashing", VLDB 1999) with
 /// every bucket one bit away probed too (Lv et al., "Multi-probe LSH", VLDB 2007). A posting carries 64 further bits of its
-/// descriptor, which tell true neighbours from those that merely share the bucket (Jegou, Douze, Schmid, "Hamming embedding and weak
-/// geometric consistency for large scale image search", ECCV 2008). Each query descriptor gives each keyframe one vote, weighted by
-/// closeness and by the logarithm of how few keyframes it reaches (Sivic, Zisserman, "Video Google", ICCV 2003).
+/// descriptor, which tell true neighbours from those that merely share the bucket (Jegou, Douze, Schmid, "Hamming embedding and
+/// weak geometric consistency for large scale image search", ECCV 2008). Each query descriptor gives each keyframe one vote,
+/// weighted by closeness and by the logarithm of how few keyframes it reaches (Sivic, Zisserman, "Video Google", ICCV 2003).
 ///
 /// Results depend on what is in the index alone, not on the order in which it came: votes are integers, ties go to the smaller id.
 /// Thread-bound.
 ///
-/// Memory: about 30 bytes a descriptor and at most `kMaxDescriptors` of them a keyframe, 15 kB; what is removed is used again. The
-/// table of buckets takes 512 KiB from the start.
+/// Memory: about 22 bytes a descriptor and at most `kMaxDescriptors` of them a keyframe, 11 kB; what is removed is used again. The
+/// table of buckets takes 1 MiB from the start, and up to 16 MiB go to chunks that are not full while the index is small.
 class PlaceRecognizer {
  public:
   static constexpr std::size_t kMaxDescriptors = 500;  ///< indexed of each keyframe; of more, an even choice
@@ -52,18 +53,14 @@ class PlaceRecognizer {
   /// Memory held [bytes], capacity that waits for reuse included.
   std::size_t memory_bytes() const;
 
-  /// Replaces `candidates` by at most `max_candidates` keyframes for which `eligible` holds, best first. Keyframes that share nothing
-  /// with the query are never among them.
+  /// Replaces `candidates` by at most `max_candidates` keyframes for which `eligible` holds, best first. Keyframes that share
+  /// nothing with the query are never among them.
   void query(std::span<const Descriptor> descriptors, std::size_t max_candidates, const std::function<bool(KeyframeId)>& eligible,
              std::vector<PlaceCandidate>& candidates) const;
 
  private:
-  static constexpr std::size_t kTables = 2;
-  static constexpr std::size_t kKeyBits = 16;
-  static constexpr std::size_t kBuckets = std::size_t{1} << kKeyBits;
-  static constexpr std::size_t kProbes = kTables * (1 + kKeyBits);
+  static constexpr std::size_t kKeyBits = 18;
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-  using Keys = std::array<std::uint16_t, kTables>;
 
   /// Postings of one bucket, a cache line's worth of them; only the first chunk of a bucket may have free places, at its end.
   struct alignas(64) Chunk {
@@ -76,21 +73,21 @@ class PlaceRecognizer {
 
   struct Slot {
     KeyframeId keyframe = kNoKeyframe;
-    std::vector<Keys> keys;  // of the descriptors indexed, to find the postings again
+    std::vector<std::uint32_t> keys;  // of the descriptors indexed, to find the postings again
   };
 
   struct Tally;
 
-  static Keys keys_of(const Descriptor& descriptor);
-  static std::uint64_t signature_of(const Descriptor& descriptor) { return descriptor[1]; }
-  static std::size_t bucket(std::size_t table, std::size_t key) { return table * kBuckets + key; }
-
-  void insert(std::size_t bucket, std::uint32_t slot, std::uint64_t signature);
-  void erase(std::size_t bucket, std::uint32_t slot);
+  Chunk& chunk(std::uint32_t index) { return chunk_blocks_[index / kBlock][index % kBlock]; }
+  const Chunk& chunk(std::uint32_t index) const { return chunk_blocks_[index / kBlock][index % kBlock]; }
+  std::uint32_t take_chunk();
+  void insert(std::uint32_t key, std::uint32_t slot, std::uint64_t signature);
+  void erase(std::uint32_t key, std::uint32_t slot);
   void collect(const Descriptor& descriptor, Tally& tally) const;
 
-  std::vector<std::uint32_t> first_chunk_;  // by bucket
-  std::vector<Chunk> chunks_;
+  static constexpr std::uint32_t kBlock = 4096;  // chunks: growing copies nothing
+  std::vector<std::uint32_t> first_chunk_;       // by key
+  std::vector<std::unique_ptr<Chunk[]>> chunk_blocks_;
   std::uint32_t free_chunk_ = kNone;
   std::vector<Slot> slots_;
   std::vector<std::uint32_t> free_slots_;
