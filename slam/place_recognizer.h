@@ -20,6 +20,8 @@ struct PlaceCandidate {
   /// In [0, 1]: which share of the query's descriptors the keyframe has, each weighted by how rare it is in the index and by how
   /// well it agrees. 1 is the keyframe's own descriptors asked for in an index of their own.
   double score = 0;
+
+  bool operator==(const PlaceCandidate&) const = default;
 };
 
 /// Finds keyframes that look like a query, by an inverted index of binary descriptors that needs no trained vocabulary: locality
