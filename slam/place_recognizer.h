@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -19,6 +20,8 @@ struct PlaceCandidate {
   /// In [0, 1]: which share of the query's descriptors the keyframe has, each weighted by how rare it is in the index and by how
   /// well it agrees. 1 is the keyframe's own descriptors asked for in an index of their own.
   double score = 0;
+
+  bool operator==(const PlaceCandidate&) const = default;
 };
 
 /// Finds keyframes that look like a query, by an inverted index of binary descriptors that needs no trained vocabulary: locality
@@ -31,8 +34,8 @@ struct PlaceCandidate {
 /// Results depend on what is in the index alone, not on the order in which it came: votes are integers, ties go to the smaller id.
 /// Thread-bound.
 ///
-/// Memory: about 30 bytes a descriptor and at most `kMaxDescriptors` of them a keyframe, 15 kB; what is removed is used again. The
-/// table of buckets takes 512 KiB from the start.
+/// Memory: about 22 bytes a descriptor and at most `kMaxDescriptors` of them a keyframe, 11 kB; what is removed is used again. The
+/// table of buckets takes 1 MiB from the start, and up to 16 MiB go to chunks that are not full while the index is small.
 class PlaceRecognizer {
  public:
   static constexpr std::size_t kMaxDescriptors = 500;  ///< indexed of each keyframe; of more, an even choice
@@ -58,12 +61,8 @@ class PlaceRecognizer {
              std::vector<PlaceCandidate>& candidates) const;
 
  private:
-  static constexpr std::size_t kTables = 2;
-  static constexpr std::size_t kKeyBits = 16;
-  static constexpr std::size_t kBuckets = std::size_t{1} << kKeyBits;
-  static constexpr std::size_t kProbes = kTables * (1 + kKeyBits);
+  static constexpr std::size_t kKeyBits = 18;
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-  using Keys = std::array<std::uint16_t, kTables>;
 
   /// Postings of one bucket, a cache line's worth of them; only the first chunk of a bucket may have free places, at its end.
   struct alignas(64) Chunk {
@@ -76,21 +75,21 @@ class PlaceRecognizer {
 
   struct Slot {
     KeyframeId keyframe = kNoKeyframe;
-    std::vector<Keys> keys;  // of the descriptors indexed, to find the postings again
+    std::vector<std::uint32_t> keys;  // of the descriptors indexed, to find the postings again
   };
 
   struct Tally;
 
-  static Keys keys_of(const Descriptor& descriptor);
-  static std::uint64_t signature_of(const Descriptor& descriptor) { return descriptor[1]; }
-  static std::size_t bucket(std::size_t table, std::size_t key) { return table * kBuckets + key; }
-
-  void insert(std::size_t bucket, std::uint32_t slot, std::uint64_t signature);
-  void erase(std::size_t bucket, std::uint32_t slot);
+  Chunk& chunk(std::uint32_t index) { return chunk_blocks_[index / kBlock][index % kBlock]; }
+  const Chunk& chunk(std::uint32_t index) const { return chunk_blocks_[index / kBlock][index % kBlock]; }
+  std::uint32_t take_chunk();
+  void insert(std::uint32_t key, std::uint32_t slot, std::uint64_t signature);
+  void erase(std::uint32_t key, std::uint32_t slot);
   void collect(const Descriptor& descriptor, Tally& tally) const;
 
-  std::vector<std::uint32_t> first_chunk_;  // by bucket
-  std::vector<Chunk> chunks_;
+  static constexpr std::uint32_t kBlock = 4096;  // chunks: growing copies nothing
+  std::vector<std::uint32_t> first_chunk_;       // by key
+  std::vector<std::unique_ptr<Chunk[]>> chunk_blocks_;
   std::uint32_t free_chunk_ = kNone;
   std::vector<Slot> slots_;
   std::vector<std::uint32_t> free_slots_;

@@ -8,6 +8,7 @@ namespace posed {
 namespace {
 
 constexpr int kSeedInliers = 12;  // that RANSAC must find before the surroundings are searched
+constexpr float kSeedRadius = 10.0F;  // [pixels on level 0]
 constexpr int kColumns = 8;
 constexpr int kRows = 6;
 constexpr std::size_t kLandmarkCapacity = 4000;
@@ -23,13 +24,13 @@ PlaceVerifier::PlaceVerifier(const PinholeCamera& camera, const TrackerConfig& c
 
 std::optional<PlaceMatch> PlaceVerifier::verify(const MapSnapshot& around, const SnapshotKeyframe& candidate,
                                                 const FeatureFrame& frame, int min_inliers) {
-  const auto seed = recovery_.recover(around, candidate, frame, kSeedInliers);
+  const auto seed = recovery_.recover(around, candidate, frame, std::min(kSeedInliers, min_inliers));
   if (!seed) {
     return std::nullopt;
   }
-  localizer_.begin_at(frame, seed->T_map_camera);
-  // Twice: the seed rests on few matches, so the first search may miss much.
-  if (!localizer_.refine(around, frame, kSeedInliers) || !localizer_.refine(around, frame, min_inliers)) {
+  // Twice: the first pose rests on one keyframe's matches, so the first search is wide and may still miss much.
+  localizer_.match(around, frame, {}, seed->T_map_camera, kSeedRadius);
+  if (!localizer_.solve(around, frame, seed->T_map_camera) || !localizer_.refine(around, frame, min_inliers)) {
     return std::nullopt;
   }
   PlaceMatch match;

@@ -42,7 +42,8 @@ struct Image {
   ImageView<T> view;
 
   Image(int width, int height, int channels = 1)
-      : pixels(static_cast<std::size_t>(width * height * channels)), view{pixels.data(), width, height, width * channels, channels} {}
+      : pixels(static_cast<std::size_t>(width * height * channels)),
+        view{pixels.data(), width, height, width * channels, channels} {}
 };
 
 void keep_those_with_depth(const Features& features, ImageView<const float> depth_m, std::vector<Descriptor>& descriptors) {
@@ -58,7 +59,8 @@ void keep_those_with_depth(const Features& features, ImageView<const float> dept
 /// One synthetic room and a camera in it.
 class Room {
  public:
-  explicit Room(int seed) : seed_(seed), world_(config(seed)), renderer_(world_, small_camera()), sensor_(static_cast<std::uint32_t>(seed)) {}
+  explicit Room(int seed)
+      : seed_(seed), world_(config(seed)), renderer_(world_, small_camera()), sensor_(static_cast<std::uint32_t>(seed)) {}
 
   Se3 path(double t_s) const { return world_.camera_pose(t_s); }
 
@@ -133,7 +135,8 @@ void write_views(std::ostream& out, const std::vector<PlaceView>& views) {
     const Vector6d xi = v.T_room_camera.log();
     out.write(reinterpret_cast<const char*>(xi.data()), sizeof(double) * 6);
     write_value(out, v.descriptors.size());
-    out.write(reinterpret_cast<const char*>(v.descriptors.data()), static_cast<std::streamsize>(v.descriptors.size() * sizeof(Descriptor)));
+    out.write(reinterpret_cast<const char*>(v.descriptors.data()),
+              static_cast<std::streamsize>(v.descriptors.size() * sizeof(Descriptor)));
   }
 }
 
@@ -173,8 +176,9 @@ std::map<double, Se3> read_truth(const std::filesystem::path& file) {
 }  // namespace
 
 PlaceViews synthetic_place_views(int rooms, int per_room, int queries_per_room) {
-  const std::filesystem::path cache = std::filesystem::temp_directory_path() /
-                                      fmt::format("posed_place_views_{}_{}_{}_{}.bin", rooms, per_room, queries_per_room, kFeatures);
+  const std::filesystem::path cache =
+      std::filesystem::temp_directory_path() /
+      fmt::format("posed_place_views_{}_{}_{}_{}.bin", rooms, per_room, queries_per_room, kFeatures);
   PlaceViews views;
   if (std::ifstream in(cache, std::ios::binary); in) {
     views.keyframes = read_views(in);

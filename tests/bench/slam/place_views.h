@@ -22,9 +22,9 @@ struct PlaceViews {
   std::vector<PlaceView> queries;
 };
 
-/// Views of synthetic rooms, 320x240, each room a seed of its own: in every room the camera goes round once in `per_room` keyframes,
-/// and `queries_per_room` queries are taken 0.1 to 0.3 m and 5 to 15 degrees beside one of them. Features are kept in a file of the
-/// system's temporary folder, because rendering takes long. Ends the program with a message where that fails.
+/// Views of synthetic rooms, 320x240, each room a seed of its own: in every room the camera goes round once in `per_room`
+/// keyframes, and `queries_per_room` queries are taken 0.1 to 0.3 m and 5 to 15 degrees beside one of them. Features are kept in a
+/// file of the system's temporary folder, because rendering takes long. Ends the program with a message where that fails.
 PlaceViews synthetic_place_views(int rooms, int per_room, int queries_per_room);
 
 /// Views of a recording with ground truth: every tenth frame a keyframe, the frames in the middle between two of them queries, as
