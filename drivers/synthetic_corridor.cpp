@@ -1,4 +1,5 @@
 #include <array>
+#include <cstdint>
 #include <numbers>
 #include <utility>
 
@@ -17,26 +18,39 @@ constexpr double kCorner_m = 0.7;      ///< radius of the way's corners
 constexpr double kHalfLong_m = 4.6;
 constexpr double kHalfShort_m = 7.5 + kCorner_m * (2 - std::numbers::pi / 2) - kHalfLong_m;
 
+void hang_notice_board(Furnisher& furnisher, HashRng& rng, const Place& wall, float x, float width) {
+  const float height = rng.uniform(0.9F, 1.2F);
+  furnisher.notice_board(wall, x, rng.uniform(0.8F, 0.95F), width, height);
+}
+
+void hang_two_pictures(Furnisher& furnisher, HashRng& rng, const Place& wall, float x, float width) {
+  const float low_height = rng.uniform(0.6F, 0.8F);
+  furnisher.picture(wall, x, rng.uniform(0.25F, 0.4F), width, low_height);
+  const float high_height = rng.uniform(0.7F, 0.95F);
+  furnisher.picture(wall, x, rng.uniform(1.3F, 1.4F), width, high_height);
+}
+
 /// Furnishes a stretch of `length` metres around the place's x = 0 from one end to the other.
 void furnish_stretch(SceneBuilder& builder, Furnisher& furnisher, const Place& wall, float length) {
-  HashRng& rng = builder.rng();
+  enum Kind : std::uint32_t { Door, Standing, NoticeBoard, Pictures };
   constexpr std::array<Furniture, 4> kStanding{Furniture::LowShelf, Furniture::Cartons, Furniture::Cabinet, Furniture::Chairs};
+  HashRng& rng = builder.rng();
   std::uint32_t turn = rng.index(4);
   for (float x = -length / 2;;) {
-    const std::uint32_t kind = turn++ % 4;
-    const float width = kind == 0 ? 1.1F : kind == 1 ? 1.75F : kind == 2 ? rng.uniform(1.0F, 1.5F) : rng.uniform(0.6F, 0.9F);
+    const auto kind = static_cast<Kind>(turn++ % 4);
+    const float width = kind == Door          ? 1.1F
+                        : kind == Standing    ? 1.75F
+                        : kind == NoticeBoard ? rng.uniform(1.0F, 1.5F)
+                                              : rng.uniform(0.6F, 0.9F);
     if (x + width > length / 2) {
       return;
     }
     const float middle = x + width / 2;
     switch (kind) {
-      case 0: furnisher.door(wall, middle); break;
-      case 1: furnisher.furnish_below_pictures(wall, middle, kStanding[rng.index(4)], kPicturesTo_m); break;
-      case 2: furnisher.notice_board(wall, middle, rng.uniform(0.8F, 0.95F), width, rng.uniform(0.9F, 1.2F)); break;
-      default:
-        furnisher.picture(wall, middle, rng.uniform(0.25F, 0.4F), width, rng.uniform(0.6F, 0.8F));
-        furnisher.picture(wall, middle, rng.uniform(1.3F, 1.4F), width, rng.uniform(0.7F, 0.95F));
-        break;
+      case Door: furnisher.door(wall, middle); break;
+      case Standing: furnisher.furnish_below_pictures(wall, middle, kStanding[rng.index(4)], kPicturesTo_m); break;
+      case NoticeBoard: hang_notice_board(furnisher, rng, wall, middle, width); break;
+      case Pictures: hang_two_pictures(furnisher, rng, wall, middle, width); break;
     }
     x += width + rng.uniform(0.12F, 0.3F);
   }

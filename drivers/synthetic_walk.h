@@ -17,7 +17,6 @@ class WalkTrajectory final : public SyntheticTrajectory {
   static constexpr double kLookAhead_m = 1.4;
   static constexpr double kMaxSpeed_m_s = 0.85;  ///< sway included
   static constexpr double kMaxRate_rad_s = 1.0;  ///< 57 degrees a second
-  static constexpr double kMaxSway_m = 0.08;     ///< to each side
 
   WalkTrajectory(RoundedPath path, std::uint32_t seed);
 
