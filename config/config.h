@@ -13,6 +13,7 @@ namespace posed {
 enum class SourceKind { Synthetic, Replay };
 enum class Pacing { Realtime, Lockstep };
 enum class SyntheticMode { Sitting, Walking };
+enum class SyntheticWorldKind { Room, Corridor, Office, TwinRooms };
 
 struct ReplayConfig {
   std::string sequence;      ///< folder in the TUM RGB-D layout
@@ -23,6 +24,7 @@ struct ReplayConfig {
 };
 
 struct SyntheticConfig {
+  SyntheticWorldKind world = SyntheticWorldKind::Room;
   SyntheticMode mode = SyntheticMode::Walking;
   int people = 2;
   std::int64_t seed = 1;

@@ -18,6 +18,10 @@ namespace {
 void check_rules(StrictReader& reader, const Config& c) {
   reader.require(c.source.kind != SourceKind::Replay || !c.source.replay.sequence.empty(),
                  {"source.kind", "source.replay.sequence"}, "needs source.replay.sequence, the folder of a recording");
+  reader.require(
+      c.source.synthetic.people == 0 || c.source.synthetic.world == SyntheticWorldKind::Room,
+      {"source.synthetic.world", "source.synthetic.people"},
+      fmt::format("only the world \"room\" has people: source.synthetic.people ({}) must be 0 here", c.source.synthetic.people));
   reader.require(c.tracker.fast_threshold_minimum <= c.tracker.fast_threshold,
                  {"tracker.fast_threshold_minimum", "tracker.fast_threshold"},
                  fmt::format("tracker.fast_threshold_minimum ({}) must be at most tracker.fast_threshold ({})",

@@ -92,7 +92,7 @@ class SchemaBuilder {
 void add_source(SchemaBuilder& schema, SourceConfig& c) {
   schema.section("source", "Where frames come from and how fast.")
       .key("kind", choice(c.kind, {{"synthetic", SourceKind::Synthetic}, {"replay", SourceKind::Replay}}), "",
-           "`synthetic` renders a room with walking people; `replay` reads a recording.")
+           "`synthetic` renders a world, such as a room with walking people; `replay` reads a recording.")
       .key("pacing", choice(c.pacing, {{"realtime", Pacing::Realtime}, {"lockstep", Pacing::Lockstep}}), "",
            "`realtime` delivers frames when their stamps say and drops what cannot be kept up with; `lockstep` processes every "
            "frame, as "
@@ -109,12 +109,21 @@ void add_source(SchemaBuilder& schema, SourceConfig& c) {
       .key("decode_ahead", integer(c.replay.decode_ahead, 1, 64), "frames",
            "Images decoded before they are due, on a thread of their own.")
       .key("loop", BoolField{&c.replay.loop}, "", "Begin again at the end of the recording.");
-  schema.section("source.synthetic", "The rendered room, for `kind = \"synthetic\"`. Its image size is the calibration's.")
+  schema.section("source.synthetic", "The rendered world, for `kind = \"synthetic\"`. Its image size is the calibration's.")
+      .key("world",
+           choice(c.synthetic.world, {{"room", SyntheticWorldKind::Room},
+                                      {"corridor", SyntheticWorldKind::Corridor},
+                                      {"office", SyntheticWorldKind::Office},
+                                      {"twin_rooms", SyntheticWorldKind::TwinRooms}}),
+           "",
+           "Where the camera is: `room` sweeps the view once around a furnished room in 60 s; the others are walked through, round "
+           "after round: `corridor` is a ring, 30 m and 45 s a round; `office` has 10 x 8 m, desks and partitions, 43 s a round; "
+           "`twin_rooms` are two rooms that look exactly alike, joined by a corridor, 40 s a round.")
       .key("mode", choice(c.synthetic.mode, {{"sitting", SyntheticMode::Sitting}, {"walking", SyntheticMode::Walking}}), "",
-           "What the people do: `sitting` moves heads and arms, `walking` crosses the view.")
-      .key("people", integer(c.synthetic.people, 0, 20), "", "People in the room.")
+           "What the people in the room do: `sitting` moves heads and arms, `walking` crosses the view.")
+      .key("people", integer(c.synthetic.people, 0, 20), "", "People in the room; the other worlds have none, and need 0.")
       .key("seed", integer(c.synthetic.seed, 0, std::numeric_limits<std::int64_t>::max()), "",
-           "Of the random room, motion and noise: the same seed renders the same frames.")
+           "Of the random world, motion and noise: the same seed renders the same frames.")
       .key("rate_hz", real(c.synthetic.rate_hz, 1.0, 240.0), "Hz", "Frame rate.")
       .key("duration_s", real(c.synthetic.duration_s, 0.0, 1e6), "s", "Length of the simulation; 0 is endless.")
       .key("sensor_noise", BoolField{&c.synthetic.sensor_noise}, "",
