@@ -15,7 +15,8 @@ namespace posed {
 
 namespace {
 
-// A step that lowers the cost, a chi-squared, by less than this share of it ends the optimisation; a share of 1 where it is smaller.
+// A step that lowers the cost, a chi-squared, by less than this share of it ends the optimisation; a share of 1 where it is
+// smaller.
 constexpr double kCostTolerance = 1e-9;
 constexpr std::size_t kEdgesBetweenInterrupts = 256;
 constexpr std::uint32_t kFixed = std::numeric_limits<std::uint32_t>::max();
