@@ -1,38 +1,9 @@
 #include "slam/bundle_adjuster.h"
 
-#include <algorithm>
-#include <cmath>
-
+#include "slam/marquardt_damping.h"
 #include "slam/schur_solver.h"
 
 namespace posed {
-
-namespace {
-
-constexpr double kInitialDamping = 1e-4;
-constexpr double kLeastDamping = 1e-9;
-constexpr double kGreatestDamping = 1e8;
-
-/// Levenberg-Marquardt's damping, steered by the ratio of actual to predicted decrease (Madsen, Nielsen, Tingleff, equation 3.17).
-class Damping {
- public:
-  double value() const { return value_; }
-  bool is_exhausted() const { return value_ > kGreatestDamping; }
-  void accepted(double gain_ratio) {
-    value_ = std::max(kLeastDamping, value_ * std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain_ratio - 1.0, 3)));
-    growth_ = 2.0;
-  }
-  void refused() {
-    value_ *= growth_;
-    growth_ *= 2.0;
-  }
-
- private:
-  double value_ = kInitialDamping;
-  double growth_ = 2.0;
-};
-
-}  // namespace
 
 class BundleAdjuster::Minimiser {
  public:
@@ -85,7 +56,7 @@ BundleOutcome BundleAdjuster::Minimiser::run_round(BundleProblem& problem, const
   if (!solver_.evaluate(problem.cameras, problem.points, robust, interrupt, cost)) {
     return BundleOutcome::Interrupted;
   }
-  Damping damping;
+  MarquardtDamping damping;
   bool is_linearised = false;
   for (int i = 0; i < options.max_iterations; ++i) {
     if (!is_linearised && !solver_.linearise(problem.cameras, problem.points, robust, interrupt)) {

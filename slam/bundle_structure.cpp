@@ -4,8 +4,7 @@
 #include <cassert>
 #include <limits>
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
+#include "slam/elimination_order.h"
 
 namespace posed {
 
@@ -108,28 +107,11 @@ void BundleStructure::find_pattern() {
 }
 
 void BundleStructure::order_for_elimination() {
-  const auto unknowns = static_cast<int>(unknowns_.size());
-  if (unknowns < 3 || pattern_.rows.size() == unknowns_.size() * (unknowns_.size() + 1) / 2) {
-    return;  // every order is as good where every block is there
-  }
-  Eigen::SparseMatrix<double> graph(unknowns, unknowns);
-  graph.reserve(static_cast<Eigen::Index>(pattern_.rows.size()));
-  for (int j = 0; j < unknowns; ++j) {
-    graph.startVec(j);
-    const auto column = static_cast<std::size_t>(j);
-    for (std::uint32_t q = pattern_.offsets[column]; q < pattern_.offsets[column + 1]; ++q) {
-      graph.insertBack(static_cast<int>(pattern_.rows[q]), j) = 1.0;
-    }
-  }
-  graph.finalize();
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> eliminated;  // which pose is the n-th
-  Eigen::AMDOrdering<int>()(graph, eliminated);
-
   cursor_ = unknowns_;
-  for (int n = 0; n < unknowns; ++n) {
-    const std::uint32_t camera = cursor_[static_cast<std::size_t>(eliminated.indices()[n])];
-    unknowns_[static_cast<std::size_t>(n)] = camera;
-    unknown_of_camera_[camera] = n;
+  const std::vector<std::uint32_t> order = elimination_order(pattern_);
+  for (std::uint32_t n = 0; n < order.size(); ++n) {
+    unknowns_[n] = cursor_[order[n]];
+    unknown_of_camera_[unknowns_[n]] = static_cast<std::int32_t>(n);
   }
   group_by_camera();
   find_pattern();

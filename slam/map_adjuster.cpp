@@ -118,7 +118,7 @@ BundleSummary MapAdjuster::adjust(Map& map, int iterations, const Interrupt& int
     map.find_landmark(points_[p])->p_map = problem_.points[p].p_map;
   }
   for (const BundleObservation& o : problem_.observations) {
-    if (!o.inlier) {
+    if (!o.inlier && summary.outcome != BundleOutcome::Interrupted) {  // the flags of a half-way state say little
       map.forget_observation(points_[o.point], cameras_[o.camera]);
     }
   }

@@ -4,19 +4,13 @@
 
 #include <Eigen/LU>
 
+#include "slam/marquardt_damping.h"
+
 namespace posed {
 
 namespace {
 
 constexpr std::size_t kPointsBetweenInterrupts = 256;
-// Damping scales the diagonal, so a direction that nothing observes needs a least one.
-constexpr double kLeastDiagonal = 1e-6;
-
-/// What damping adds to a diagonal.
-template <typename Hessian>
-auto damping_terms(const Hessian& hessian, double damping) {
-  return (damping * hessian.diagonal().array().max(kLeastDiagonal)).matrix();
-}
 
 bool is_pause(std::size_t n, const Interrupt& interrupt) {
   return n % kPointsBetweenInterrupts == 0 && is_interrupted(interrupt);
@@ -138,7 +132,7 @@ bool SchurSolver::invert_points(double damping, const Interrupt& interrupt) {
     }
     PointSystem& system = points_[p];
     Eigen::Matrix3d damped = system.hessian;
-    damped.diagonal() += damping_terms(system.hessian, damping);
+    damped.diagonal() += MarquardtDamping::terms(system.hessian, damping);
     system.damped_inverse = damped.inverse();
     system.step.noalias() = system.damped_inverse * system.gradient;
   }
@@ -165,7 +159,7 @@ void SchurSolver::reduce_column(std::uint32_t column, double damping) {
   const PoseTerms& pose = poses_[column];
   Matrix6d& diagonal = reduced_[pattern.offsets[column]];
   diagonal = pose.hessian;
-  diagonal.diagonal() += damping_terms(pose.hessian, damping);
+  diagonal.diagonal() += MarquardtDamping::terms(pose.hessian, damping);
   Vector6d right_side = pose.gradient;
 
   const std::vector<ActiveObservation>& observations = structure_.observations();
@@ -202,11 +196,12 @@ bool SchurSolver::substitute_back(double damping, const Interrupt& interrupt) {
       }
     }
     point.step.noalias() = point.damped_inverse * right_side;
-    predicted_decrease_ += point.step.dot(point.gradient + damping_terms(point.hessian, damping).cwiseProduct(point.step));
+    predicted_decrease_ +=
+        point.step.dot(point.gradient + MarquardtDamping::terms(point.hessian, damping).cwiseProduct(point.step));
   }
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const Vector6d step = pose_step_.segment<6>(static_cast<Eigen::Index>(6 * i));
-    predicted_decrease_ += step.dot(poses_[i].gradient + damping_terms(poses_[i].hessian, damping).cwiseProduct(step));
+    predicted_decrease_ += step.dot(poses_[i].gradient + MarquardtDamping::terms(poses_[i].hessian, damping).cwiseProduct(step));
   }
   return true;
 }

@@ -5,7 +5,7 @@
 
 #include <ceres/ceres.h>
 
-#include "slam/se3_manifold.h"
+#include "tests/support/se3_manifold.h"
 
 namespace posed {
 
