@@ -27,7 +27,7 @@ struct FloorShadow {
 /// Carpet of irregular tiles with a patterned rug in the middle.
 MipTexture paint_floor(float width_m, float height_m, std::span<const FloorShadow> shadows, std::uint32_t seed);
 
-/// Speckled vinyl in large sheets: the floor of a corridor.
+/// Speckled vinyl in large sheets, scuffed by shoes: the floor of a corridor or an office.
 MipTexture paint_vinyl_floor(float width_m, float height_m, std::span<const FloorShadow> shadows, std::uint32_t seed);
 
 MipTexture paint_ceiling(float width_m, float height_m, std::uint32_t seed);

@@ -73,7 +73,8 @@ WalkedPlace build_office(std::uint32_t seed) {
   builder.add_painted_walls(area);
   builder.add_ceiling(area, builder.add_texture(paint_ceiling(2 * kHalfLength_m, 2 * kHalfWidth_m, builder.rng().next())));
   const std::vector<FloorShadow> shadows = builder.shadows_on(area);
-  builder.add_floor(area, builder.add_texture(paint_floor(2 * kHalfLength_m, 2 * kHalfWidth_m, shadows, builder.rng().next())));
+  builder.add_floor(area,
+                    builder.add_texture(paint_vinyl_floor(2 * kHalfLength_m, 2 * kHalfWidth_m, shadows, builder.rng().next())));
   return {.scene = std::move(builder).finish(), .path = way_through()};
 }
 
