@@ -1,6 +1,7 @@
 #include "slam/map_io.h"
 
 #include <array>
+#include <limits>
 #include <string_view>
 #include <utility>
 
@@ -86,6 +87,7 @@ class MapLoader {
   map_keyframe_t keyframe_{};
   std::int64_t last_landmark_ = 0;
   std::int64_t last_keyframe_ = 0;
+  std::int64_t last_loop_ = 0;
   std::int64_t landmarks_ = 0;
   std::int64_t keyframes_ = 0;
   std::int64_t loops_ = 0;
@@ -122,12 +124,13 @@ Status MapLoader::take_header(const std::string& path) {
   if (*kind != MapRecordKind::Header || !file_.decode(announced_)) {
     return file_.damaged("it has no header");
   }
+  constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() / kNsPerUs;
+  if (announced_.next_landmark < 1 || announced_.utime > kLatest || announced_.utime < -kLatest) {
+    return file_.damaged("its numbers are not possible");
+  }
   loaded_.header = from_message(announced_);
   if (const std::string broken = broken_rule(loaded_.header); !broken.empty()) {
     return file_.damaged(broken);
-  }
-  if (announced_.next_landmark < 1) {
-    return file_.damaged("the next landmark's identifier is not possible");
   }
   loaded_.map.restore_next_landmark(static_cast<LandmarkId>(announced_.next_landmark));
   if (const std::string differs = difference(loaded_.header, expected_); !differs.empty()) {
@@ -190,6 +193,10 @@ Status MapLoader::take_loop() {
   if (!file_.decode(message)) {
     return file_.damaged("it is no loop");
   }
+  if (message.keyframe < last_loop_) {
+    return file_.damaged("the loops are not in the order of their keyframes");
+  }
+  last_loop_ = message.keyframe;
   ++loops_;
   const auto id = static_cast<KeyframeId>(message.keyframe);
   const LoopConstraint loop = from_message(message);

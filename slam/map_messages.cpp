@@ -1,8 +1,6 @@
 #include "slam/map_messages.h"
 
-#include <algorithm>
 #include <cstdint>
-#include <limits>
 
 namespace posed {
 
@@ -77,8 +75,7 @@ map_header_t to_message(const MapHeader& header, const Map& map) {
 
 MapHeader from_message(const map_header_t& message) {
   MapHeader header;
-  constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() / kNsPerUs;
-  header.saved_utc_ns = std::clamp(message.utime, -kLatest, kLatest) * kNsPerUs;
+  header.saved_utc_ns = message.utime * kNsPerUs;
   CameraIntrinsics& k = header.camera;
   k.width = message.width;
   k.height = message.height;

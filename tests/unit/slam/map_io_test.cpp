@@ -148,8 +148,9 @@ TEST_F(MapIoTest, TheBytesAreAFunctionOfTheMap) {
 }
 
 TEST_F(MapIoTest, EveryTruncationIsRefused) {
-  save(random_map(3, 2, 4));
+  save(random_map(3, 1, 3));
   const std::string bytes = contents_of(path_);
+  ASSERT_GT(bytes.size(), 1000U);
   for (std::size_t length = 0; length < bytes.size(); ++length) {
     ASSERT_EQ(refusal_of(bytes.substr(0, length)).code, ErrorCode::BadData) << length << " of " << bytes.size();
   }
@@ -192,7 +193,7 @@ TEST_F(MapIoTest, ChangedRecordsWithRightChecksumsNeverCrash) {
   const MapFileBytes file(contents_of(path_));
   std::mt19937 random(9);
   int refused = 0;
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < 500; ++i) {
     MapFileBytes changed = file;
     std::string& payload = changed.records()[random() % changed.records().size()].payload;
     payload[random() % payload.size()] = static_cast<char>(random());
@@ -204,13 +205,13 @@ TEST_F(MapIoTest, ChangedRecordsWithRightChecksumsNeverCrash) {
       EXPECT_THAT(loaded.error().message, HasSubstr(path_));
     }
   }
-  EXPECT_GT(refused, 100);
+  EXPECT_GT(refused, 50);
 }
 
 TEST_F(MapIoTest, ACountThatIsTooLargeIsRefusedBeforeRoomIsMade) {
   save(random_map(10, 1, 4));
   MapFileBytes file(contents_of(path_));
-  std::string& payload = file.records()[file.records().size() - 2].payload;
+  std::string& payload = file.records().back().payload;
   ASSERT_GT(payload.size(), 400U) << "no keyframe";
   constexpr std::size_t kKeypoints = 8;
   payload.replace(kKeypoints, 8, std::string("\x03\xFF\xFF\xFF\x7F\xFF\xFF\xE0", 8));
