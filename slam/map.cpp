@@ -47,6 +47,10 @@ void Map::restore_landmark(LandmarkId id, Landmark landmark) {
   next_landmark_ = std::max(next_landmark_, id + 1);
 }
 
+void Map::restore_next_landmark(LandmarkId next) {
+  next_landmark_ = std::max(next_landmark_, next);
+}
+
 void Map::change_covisibility(const Landmark& landmark, KeyframeId keyframe, int change) {
   Keyframe& k = keyframes_.at(keyframe);
   const auto add = [change](std::map<KeyframeId, int>& shared, KeyframeId with) {

@@ -68,6 +68,9 @@ class Map {
   /// A landmark as it was saved, without observations: those come with its keyframes.
   void restore_landmark(LandmarkId id, Landmark landmark);
 
+  /// The next landmark gets this identifier or a higher one: identifiers go on from where the saved map stood.
+  void restore_next_landmark(LandmarkId next);
+
   /// Links a landmark to a keypoint that has none, of a keyframe that does not see it yet.
   void observe(LandmarkId landmark, KeyframeId keyframe, std::uint16_t keypoint);
 

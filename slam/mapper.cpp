@@ -14,6 +14,7 @@
 #include "slam/loop_closer.h"
 #include "slam/map.h"
 #include "slam/map_budget.h"
+#include "slam/map_io.h"
 #include "slam/place_recognizer.h"
 #include "slam/relocalizer.h"
 
@@ -40,7 +41,9 @@ Interrupt within(const Interrupt& interrupt, double budget_s) {
 
 struct Mapper::Impl {
   Impl(const TrackerConfig& tracker, const MapperConfig& mapper, MapMode map_mode, const CameraIntrinsics& intrinsics)
-      : config(mapper),
+      : pyramid_levels(tracker.pyramid_levels),
+        pyramid_scale(tracker.pyramid_scale),
+        config(mapper),
         mode(map_mode),
         estimator(tracker, intrinsics),
         local(tracker, mapper, estimator, map),
@@ -63,7 +66,11 @@ struct Mapper::Impl {
   void drop(KeyframeId id);
   void follow_newest(const Se3& T_map_camera_before);
   void write_snapshot(MapSnapshot& snapshot) const;
+  MapHeader header() const;
+  Status load(const std::string& path);
 
+  int pyramid_levels;
+  double pyramid_scale;
   MapperConfig config;
   MapMode mode;
   Map map;
@@ -313,6 +320,35 @@ void Mapper::Impl::write_snapshot(MapSnapshot& snapshot) const {
   write_local_map(map, surroundings, static_cast<std::size_t>(config.recovery_keyframes), snapshot);
 }
 
+MapHeader Mapper::Impl::header() const {
+  MapHeader h;
+  h.camera = estimator.camera().intrinsics();
+  h.pyramid_levels = pyramid_levels;
+  h.pyramid_scale = pyramid_scale;
+  h.active_map = centre == kNoKeyframe ? 0 : map.find_keyframe(centre)->map_id;
+  h.highest_map = newest_map_id;
+  h.saved_utc_ns = SystemClock::instance().utc_ns(SystemClock::instance().now_ns());
+  return h;
+}
+
+Status Mapper::Impl::load(const std::string& path) {
+  Result<LoadedMap> loaded = load_map(path, header());
+  if (!loaded) {
+    return tl::unexpected<Error>(loaded.error());
+  }
+  map = std::move(loaded->map);
+  newest_map_id = loaded->header.highest_map;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    places.add(id, keyframe.features.descriptors);
+    newest_seen = id;
+    newest = keyframe.map_id == loaded->header.active_map || newest == kNoKeyframe ? id : newest;
+  }
+  centre = newest;
+  anchor = newest;
+  ++version;
+  return {};
+}
+
 Mapper::Mapper(const TrackerConfig& tracker, const MapperConfig& config, MapMode mode, const CameraIntrinsics& camera)
     : impl_(std::make_unique<Impl>(tracker, config, mode, camera)) {}
 Mapper::~Mapper() = default;
@@ -322,6 +358,12 @@ void Mapper::insert(const KeyframeRecord& record) {
 }
 bool Mapper::improve(const Interrupt& interrupt) {
   return impl_->improve(interrupt);
+}
+Status Mapper::save(const std::string& path) const {
+  return save_map(path, impl_->map, impl_->header());
+}
+Status Mapper::load(const std::string& path) {
+  return impl_->load(path);
 }
 void Mapper::write_snapshot(MapSnapshot& snapshot) const {
   impl_->write_snapshot(snapshot);

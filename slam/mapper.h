@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "config/config.h"
+#include "core/result.h"
 #include "slam/interrupt.h"
 #include "slam/keyframe_record.h"
 #include "slam/map_snapshot.h"
@@ -39,6 +41,12 @@ class Mapper {
   /// it has reached; the adjustment of the whole map is then taken up again. Where `interrupt` is not empty, pieces also keep to
   /// their configured time.
   bool improve(const Interrupt& interrupt);
+
+  /// Writes all maps to a file, which is replaced as a whole. Errors: as save_map; the old file is kept.
+  Status save(const std::string& path) const;
+
+  /// Before the first keyframe: takes the maps of a file. Errors: as load_map; nothing is taken then.
+  Status load(const std::string& path);
 
   /// Overwrites `snapshot` with the present local map; its vectors keep their capacity.
   void write_snapshot(MapSnapshot& snapshot) const;
