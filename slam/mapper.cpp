@@ -63,6 +63,7 @@ struct Mapper::Impl {
   void close_loop();
   void adjust_all(const Interrupt& interrupt);
   void cull();
+  void keep_budget();
   void drop(KeyframeId id);
   void follow_newest(const Se3& T_map_camera_before);
   void write_snapshot(MapSnapshot& snapshot) const;
@@ -155,6 +156,7 @@ void Mapper::Impl::insert_keyframe(const KeyframeRecord& record) {
   centre = record.id;
   renew_anchor(record.covariance);
   places.add(record.id, keyframe.features.descriptors);
+  keep_budget();
   extend_pending = true;
   adjust_pending = config.bundle_keyframes > 0;
   loop_pending = config.loop_closing;
@@ -281,6 +283,9 @@ void Mapper::Impl::cull() {
       drop(id);
     }
   }
+}
+
+void Mapper::Impl::keep_budget() {
   while (const std::optional<KeyframeId> excess = budget.excess_keyframe(newest)) {
     drop(*excess);
   }

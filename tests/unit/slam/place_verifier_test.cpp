@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/synthetic_camera.h"
-#include "slam/local_mapper.h"
+#include "slam/mapper.h"
 #include "slam/orb_extractor.h"
 #include "tests/support/feature_world.h"
 
@@ -29,7 +29,7 @@ struct PlaceVerifierTest : testing::Test {
   Se3 T_map_camera = Se3::exp((Vector6d() << 0.05, 0.15, -0.2, 0.3, 0.1, 0.2).finished());
 
   void SetUp() override {
-    LocalMapper mapper(config, MapperConfig{}, world.intrinsics);
+    Mapper mapper(config, MapperConfig{}, MapMode::Mapping, world.intrinsics);
     mapper.insert(FeatureWorld::record(world.view(Se3(), 0, 0, 0), 1, {}));
     mapper.write_snapshot(map);
   }
@@ -174,7 +174,7 @@ TEST(PlaceVerifier, TellsRenderedRoomsApart) {
   record.depth_m = at_start.depth_m();
   record.landmarks.assign(at_start.size(), kNoLandmark);
   const TrackerConfig config;
-  LocalMapper mapper(config, MapperConfig{}, room.intrinsics);
+  Mapper mapper(config, MapperConfig{}, MapMode::Mapping, room.intrinsics);
   mapper.insert(record);
   MapSnapshot map;
   mapper.write_snapshot(map);

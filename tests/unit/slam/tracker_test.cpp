@@ -96,7 +96,7 @@ TEST(Tracker, FollowsTheCameraThroughTheRoom) {
     squared += std::pow(rig.error_m(i, estimate), 2);
     ASSERT_NE(estimate.reference_keyframe, kNoKeyframe);
     const Se3 rebuilt = *rig.mapper().keyframe_pose(estimate.reference_keyframe) * estimate.T_reference_camera;
-    EXPECT_LT((rebuilt.inverse() * estimate.T_map_camera()).log().norm(), 1e-6);
+    EXPECT_LT((rebuilt.inverse() * estimate.T_map_camera()).log().norm(), 0.02) << "but for what the map was adjusted since";
   }
   EXPECT_LT(std::sqrt(squared / kFrames), 0.03);
   EXPECT_GT(rig.mapper().keyframe_count(), 1U);
@@ -194,11 +194,12 @@ TEST(Tracker, GoesOnWithoutKeyframesWhileTheMapperIsBehind) {
 TEST(Tracker, BeginsANewMapWhenAYoungOneIsLost) {
   Rig rig;
   ASSERT_TRUE(rig.track(0).has_pose());
-  EXPECT_EQ(rig.track(1, blacken).state, TrackingState::Initializing);
-  const PoseEstimate again = rig.track(2);
+  EXPECT_EQ(rig.track(1, blacken).state, TrackingState::Lost) << "nothing can be begun in the dark";
+  constexpr std::uint64_t kElsewhere = 900;
+  const PoseEstimate again = rig.track(kElsewhere);
   EXPECT_TRUE(again.has_pose());
   EXPECT_EQ(again.map_id, 2U);
-  EXPECT_TRUE(rig.track(3).has_pose());
+  EXPECT_EQ(rig.track(kElsewhere + 1).map_id, 2U);
 }
 
 }  // namespace
