@@ -64,6 +64,14 @@ struct MapperConfig {
   int recovery_keyframes = 20;  ///< recent ones to match against when lost
 };
 
+enum class MapMode { Mapping, Localization };
+
+struct MapConfig {
+  std::string file;              ///< loaded at start and saved; empty: neither
+  double save_period_s = 300.0;  ///< 0: at shutdown and on request alone
+  MapMode mode = MapMode::Mapping;
+};
+
 struct PublisherConfig {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string channel_prefix = "POSED_";
@@ -100,6 +108,7 @@ struct Config {
   CameraConfig camera;
   TrackerConfig tracker;
   MapperConfig mapper;
+  MapConfig map;
   PublisherConfig publisher;
   PipelineConfig pipeline;
   LoggingConfig logging;

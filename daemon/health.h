@@ -30,6 +30,8 @@ struct HealthReport {
 
   std::size_t map_keyframes = 0;
   std::size_t map_landmarks = 0;
+  std::uint64_t map_saves = 0;
+  std::uint64_t map_save_errors = 0;
 
   LatencySummary track;    ///< time in the tracker a frame
   LatencySummary latency;  ///< capture to publish

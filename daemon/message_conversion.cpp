@@ -130,6 +130,8 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.publish_errors = count(health.publish_errors);
   message.map_keyframes = count(health.map_keyframes);
   message.map_landmarks = count(health.map_landmarks);
+  message.map_saves = count(health.map_saves);
+  message.map_save_errors = count(health.map_save_errors);
   message.peak_rss_bytes = count(health.peak_rss_bytes);
   message.track = to_message(health.track);
   message.latency = to_message(health.latency);

@@ -30,8 +30,14 @@ class SlamMapper final : public KeyframeMapper {
   std::optional<Se3> keyframe_pose(KeyframeId id) const override { return mapper_.keyframe_pose(id); }
   std::size_t keyframe_count() const override { return mapper_.keyframe_count(); }
   std::size_t landmark_count() const override { return mapper_.landmark_count(); }
+  Status save(const std::string& path) override { return cannot_keep_maps(path); }
+  Status load(const std::string& path) override { return cannot_keep_maps(path); }
 
  private:
+  static Status cannot_keep_maps(const std::string& path) {
+    return make_error(ErrorCode::Unavailable, path + ": this mapper neither saves nor loads maps");
+  }
+
   LocalMapper mapper_;
 };
 

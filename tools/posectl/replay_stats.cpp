@@ -57,6 +57,8 @@ std::string to_json(const ReplayStats& stats) {
       {"publish_errors", health.publish_errors},
       {"map_keyframes", health.map_keyframes},
       {"map_landmarks", health.map_landmarks},
+      {"map_saves", health.map_saves},
+      {"map_save_errors", health.map_save_errors},
       {"track_ms", latency_json(health.track)},
       {"latency_ms", latency_json(health.latency)},
       {"map_ms", latency_json(health.map)},

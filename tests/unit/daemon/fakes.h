@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <fstream>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -124,10 +125,12 @@ class FakeTracker final : public FrameTracker {
   KeyframeId keyframes_ = 0;
 };
 
-/// A map that is nothing but its count of keyframes.
+/// A map that is nothing but its count of keyframes; its file holds that number.
 class FakeMapper final : public KeyframeMapper {
  public:
   std::function<void()> on_insert = [] {};
+  std::function<Status(const std::string& path)> on_save = [](const std::string&) { return Status{}; };
+  std::function<Status(const std::string& path)> on_load = [](const std::string&) { return Status{}; };
 
   void insert(const KeyframeRecord& record) override {
     on_insert();
@@ -139,6 +142,16 @@ class FakeMapper final : public KeyframeMapper {
   }
   std::size_t keyframe_count() const override { return keyframes_.size(); }
   std::size_t landmark_count() const override { return 7 * keyframes_.size(); }
+  Status save(const std::string& path) override {
+    return on_save(path).map([&] { std::ofstream(path) << keyframes_.size(); });
+  }
+  Status load(const std::string& path) override {
+    return on_load(path).map([&] {
+      std::size_t count = 0;
+      std::ifstream(path) >> count;
+      keyframes_.assign(count, 1);
+    });
+  }
 
  private:
   std::vector<KeyframeId> keyframes_;
