@@ -79,8 +79,8 @@ enum class MapMode {
 };
 
 struct MapConfig {
-  std::string file;  ///< where the map is kept from run to run; empty: nowhere
-  double save_period_s = 300.0;
+  std::string file;              ///< loaded at start and saved; empty: neither
+  double save_period_s = 300.0;  ///< 0: at shutdown and on request alone
   MapMode mode = MapMode::Mapping;
 };
 

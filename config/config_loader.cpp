@@ -35,6 +35,8 @@ void check_rules(StrictReader& reader, const Config& c) {
   reader.require(c.mapper.recovery_keyframes <= c.mapper.max_keyframes, {"mapper.recovery_keyframes", "mapper.max_keyframes"},
                  fmt::format("mapper.recovery_keyframes ({}) must be at most mapper.max_keyframes ({})",
                              c.mapper.recovery_keyframes, c.mapper.max_keyframes));
+  reader.require(c.map.mode != MapMode::Localization || !c.map.file.empty(), {"map.mode", "map.file"},
+                 "needs map.file, the map to localize in");
   reader.require(c.pipeline.frame_slots >= c.pipeline.frame_queue + 2, {"pipeline.frame_slots", "pipeline.frame_queue"},
                  fmt::format("pipeline.frame_slots ({}) must be at least pipeline.frame_queue ({}) + 2", c.pipeline.frame_slots,
                              c.pipeline.frame_queue));
@@ -92,6 +94,7 @@ Result<Config> read_config(const std::string& text, const std::filesystem::path&
   check_thread(reader, "pipeline.publisher", config.pipeline.publisher);
   resolve_path(name.parent_path(), config.source.replay.sequence);
   resolve_path(name.parent_path(), config.source.replay.associations);
+  resolve_path(name.parent_path(), config.map.file);
   read_calibration(reader, std::move(folders), config);
   return reader.status().map([&] { return config; });
 }

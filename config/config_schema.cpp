@@ -188,6 +188,20 @@ void add_mapper(SchemaBuilder& schema, MapperConfig& c) {
            "is taken for a place that looks alike, and refused.");
 }
 
+void add_map(SchemaBuilder& schema, MapConfig& c) {
+  schema.section("map", "The map's file: loaded at start, saved at shutdown, periodically, and on SIGUSR1 or a message.")
+      .key("file", TextField{&c.file, {"the path of a file, or \"\"", is_path}}, "",
+           "A relative path starts at this file's folder. Where it does not exist yet a new map begins; one that is damaged or was "
+           "made "
+           "with another camera is refused and never overwritten. Empty: maps are neither loaded nor saved.")
+      .key("save_period_s", real(c.save_period_s, 0.0, 1e6), "s",
+           "Time between two saves while there is something new; 0: the map is saved at shutdown and on request alone. In "
+           "`lockstep` there "
+           "are none either.")
+      .key("mode", choice(c.mode, {{"mapping", MapMode::Mapping}, {"localization", MapMode::Localization}}), "",
+           "`mapping` extends the map; `localization` uses the map of `file`, and neither changes nor saves it.");
+}
+
 void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {
   schema.section("publisher", "What is published over LCM.")
       .key("url", TextField{&c.url, {"an LCM address such as \"udpm://239.255.76.67:7667?ttl=0\"", is_lcm_url}}, "",
@@ -236,6 +250,7 @@ Schema config_schema(Config& config) {
   add_camera(schema, config.camera);
   add_tracker(schema, config.tracker);
   add_mapper(schema, config.mapper);
+  add_map(schema, config.map);
   add_publisher(schema, config.publisher);
   add_pipeline(schema, config.pipeline);
   schema.section("logging", "Messages for people, on standard error.")

@@ -33,6 +33,8 @@ class SlamMapper final : public KeyframeMapper {
   std::size_t keyframe_count() const override { return mapper_.keyframe_count(); }
   std::size_t landmark_count() const override { return mapper_.landmark_count(); }
   MapperCounters counters() const override { return mapper_.counters(); }
+  Status save(const std::string& path) override { return mapper_.save(path); }
+  Status load(const std::string& path) override { return mapper_.load(path); }
 
  private:
   Mapper mapper_;

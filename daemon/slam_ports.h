@@ -2,9 +2,11 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "config/config.h"
 #include "core/estimates.h"
+#include "core/result.h"
 #include "core/rgbd_frame.h"
 #include "slam/keyframe_record.h"
 #include "slam/map_snapshot.h"
@@ -31,6 +33,12 @@ class KeyframeMapper {
   virtual std::size_t keyframe_count() const = 0;
   virtual std::size_t landmark_count() const = 0;
   virtual MapperCounters counters() const = 0;
+
+  /// Replaces the file `path` by the present map (slam/map_io.h, also for the errors).
+  virtual Status save(const std::string& path) = 0;
+
+  /// Begins with the map of the file `path`; before any keyframe.
+  virtual Status load(const std::string& path) = 0;
 };
 
 /// The real ones. Reentrant.

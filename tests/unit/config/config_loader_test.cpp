@@ -229,10 +229,10 @@ TEST_F(ConfigLoader, UnknownTablesAreReportedOnce) {
             "posed.toml:1:2: traker: unknown table; did you mean tracker?");
   EXPECT_EQ(error_of("[pipeline.captur]\npriority = 1"),
             "posed.toml:1:11: pipeline.captur: unknown table; did you mean pipeline.capture?");
-  EXPECT_EQ(
-      error_of("[quantum]\nspin.up = 1"),
-      "posed.toml:1:2: quantum: unknown table; allowed here: source, source.replay, source.synthetic, camera, tracker, mapper, "
-      "publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, pipeline.publisher, logging");
+  EXPECT_EQ(error_of("[quantum]\nspin.up = 1"),
+            "posed.toml:1:2: quantum: unknown table; allowed here: source, source.replay, source.synthetic, camera, tracker, "
+            "mapper, map, "
+            "publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, pipeline.publisher, logging");
 }
 
 TEST_F(ConfigLoader, DuplicatesAndSyntaxErrors) {
@@ -267,6 +267,8 @@ TEST_F(ConfigLoader, RulesBetweenKeys) {
   EXPECT_EQ(error_of("[tracker]\nfast_threshold_minimum = 21"),
             "posed.toml:2:26: tracker.fast_threshold_minimum: 21: tracker.fast_threshold_minimum (21) must be at most "
             "tracker.fast_threshold (20)");
+  EXPECT_EQ(error_of("[map]\nmode = \"localization\""),
+            "posed.toml:2:8: map.mode: \"localization\": needs map.file, the map to localize in");
   // The key that the text has is blamed.
   EXPECT_EQ(
       error_of("[tracker]\nfast_threshold = 6"),
