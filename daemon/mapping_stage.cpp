@@ -51,7 +51,6 @@ void MappingStage::finish(const std::stop_token& stop, const std::function<void(
     in_.wait_arrived(seen, kNsPerSecond);
   }
 }
-}
 
 void MappingStage::report(HealthReport& health) const {
   health.map_keyframes = keyframes_.load(std::memory_order_relaxed);
