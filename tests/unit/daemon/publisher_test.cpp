@@ -182,7 +182,7 @@ TEST(LcmTransport, HandsOnWhatItIsSubscribedTo) {
   ASSERT_TRUE(transport.open());
   transport.receive();
   EXPECT_TRUE(received.empty());
-  for (const std::string& channel : {"T_ASK", "T_OTHER", "XT_ASK"}) {
+  for (const std::string channel : {"T_ASK", "T_OTHER", "XT_ASK"}) {
     const std::string text = "to " + channel;
     ASSERT_TRUE(transport.send(channel, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}));
   }
