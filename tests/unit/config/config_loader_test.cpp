@@ -216,8 +216,9 @@ TEST_F(ConfigLoader, UnknownKeysGetTheNearestKnownOne) {
             "posed.toml:2:1: tracker.max_keyframes: 20: unknown key; did you mean mapper.max_keyframes?");
   EXPECT_EQ(error_of("features = 20"), "posed.toml:1:1: features: 20: unknown key; did you mean tracker.features?");
   EXPECT_EQ(error_of("[mapper]\nspeed = \"high\""),
-            "posed.toml:2:1: mapper.speed: \"high\": unknown key; allowed here: max_keyframes, local_landmarks, local_keyframes, "
-            "recovery_keyframes");
+            "posed.toml:2:1: mapper.speed: \"high\": unknown key; allowed here: max_keyframes, max_landmarks, local_landmarks, "
+            "local_keyframes, recovery_keyframes, bundle_keyframes, bundle_iterations, bundle_budget_s, loop_closing, "
+            "loop_max_drift");
   EXPECT_EQ(error_of("quux = 1"), "posed.toml:1:1: quux: 1: unknown key; allowed are only keys in tables, such as [tracker]");
   EXPECT_EQ(
       error_of("[pipeline]\nqueues = 3"),
@@ -278,8 +279,8 @@ TEST_F(ConfigLoader, RulesBetweenKeys) {
   EXPECT_EQ(error_of("[mapper]\nmax_keyframes = 15\nlocal_keyframes = 15"),
             "posed.toml:2:17: mapper.max_keyframes: 15: mapper.recovery_keyframes (20) must be at most mapper.max_keyframes (15)");
   EXPECT_EQ(
-      error_of("[mapper]\nlocal_keyframes = 201"),
-      "posed.toml:2:19: mapper.local_keyframes: 201: mapper.local_keyframes (201) must be at most mapper.max_keyframes (200)");
+      error_of("[mapper]\nmax_keyframes = 200\nlocal_keyframes = 201"),
+      "posed.toml:3:19: mapper.local_keyframes: 201: mapper.local_keyframes (201) must be at most mapper.max_keyframes (200)");
   EXPECT_EQ(error_of("[pipeline]\nframe_queue = 15"),
             "posed.toml:2:15: pipeline.frame_queue: 15: pipeline.frame_slots (16) must be at least pipeline.frame_queue (15) + 2");
   for (const std::string thread : {"capture", "tracker", "mapper", "publisher"}) {
