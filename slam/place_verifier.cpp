@@ -7,7 +7,7 @@ namespace posed {
 
 namespace {
 
-constexpr int kSeedInliers = 12;  // that RANSAC must find before the surroundings are searched
+constexpr int kSeedInliers = 12;      // that RANSAC must find before the surroundings are searched
 constexpr float kSeedRadius = 10.0F;  // [pixels on level 0]
 constexpr int kColumns = 8;
 constexpr int kRows = 6;

@@ -261,9 +261,10 @@ TEST_F(ConfigLoader, AllMistakesAreReportedInTheOrderOfTheText) {
 TEST_F(ConfigLoader, RulesBetweenKeys) {
   EXPECT_EQ(error_of("[source]\nkind = \"replay\""),
             "posed.toml:2:8: source.kind: \"replay\": needs source.replay.sequence, the folder of a recording");
-  EXPECT_EQ(error_of("[source.synthetic]\nworld = \"office\""),
-            "posed.toml:2:9: source.synthetic.world: \"office\": only the world \"room\" has people: source.synthetic.people (2) must "
-            "be 0 here");
+  EXPECT_EQ(
+      error_of("[source.synthetic]\nworld = \"office\""),
+      "posed.toml:2:9: source.synthetic.world: \"office\": only the world \"room\" has people: source.synthetic.people (2) must "
+      "be 0 here");
   EXPECT_TRUE(parse_config("[source.synthetic]\nworld = \"office\"\npeople = 0", "posed.toml"));
   EXPECT_EQ(error_of("[tracker]\nfast_threshold_minimum = 21"),
             "posed.toml:2:26: tracker.fast_threshold_minimum: 21: tracker.fast_threshold_minimum (21) must be at most "
