@@ -13,6 +13,7 @@ namespace posed {
 enum class SourceKind { Synthetic, Replay };
 enum class Pacing { Realtime, Lockstep };
 enum class SyntheticMode { Sitting, Walking };
+enum class SyntheticWorldKind { Room, Corridor, Office, TwinRooms };
 
 struct ReplayConfig {
   std::string sequence;      ///< folder in the TUM RGB-D layout
@@ -23,6 +24,7 @@ struct ReplayConfig {
 };
 
 struct SyntheticConfig {
+  SyntheticWorldKind world = SyntheticWorldKind::Room;
   SyntheticMode mode = SyntheticMode::Walking;
   int people = 2;
   std::int64_t seed = 1;
@@ -55,13 +57,31 @@ struct TrackerConfig {
   int min_inliers = 30;                 ///< fewer: the pose is not trusted, the state becomes lost
   int keyframe_max_interval = 30;       ///< frames
   double keyframe_inlier_ratio = 0.75;  ///< of the reference keyframe's landmarks; fewer seen asks for a keyframe
+  double new_map_after_s = 5.0;         ///< lost for so long, a new map is begun
 };
 
 struct MapperConfig {
-  int max_keyframes = 200;      ///< kept in the map
-  int local_landmarks = 8000;   ///< in the snapshot the tracker sees
-  int local_keyframes = 25;     ///< whose landmarks make the local map
-  int recovery_keyframes = 20;  ///< recent ones to match against when lost
+  int max_keyframes = 1000;      ///< kept, of all maps
+  int max_landmarks = 200'000;   ///< kept, of all maps
+  int local_landmarks = 8000;    ///< in the snapshot the tracker sees
+  int local_keyframes = 25;      ///< whose landmarks make the local map
+  int recovery_keyframes = 20;   ///< of the local map, to match against when lost
+  int bundle_keyframes = 20;     ///< moved by a local bundle adjustment; 0: none is made
+  int bundle_iterations = 5;     ///< a round, of two
+  double bundle_budget_s = 0.2;  ///< after which a local bundle adjustment is given up (not in lockstep)
+  bool loop_closing = true;      ///< look for places seen before
+  double loop_max_drift = 0.05;  ///< of the path since: a closure that asks for a larger correction is refused
+};
+
+enum class MapMode {
+  Mapping,       ///< the map grows and is corrected
+  Localization,  ///< the loaded map is used as it is
+};
+
+struct MapConfig {
+  std::string file;              ///< loaded at start and saved; empty: neither
+  double save_period_s = 300.0;  ///< 0: at shutdown and on request alone
+  MapMode mode = MapMode::Mapping;
 };
 
 struct PublisherConfig {
@@ -100,6 +120,7 @@ struct Config {
   CameraConfig camera;
   TrackerConfig tracker;
   MapperConfig mapper;
+  MapConfig map;
   PublisherConfig publisher;
   PipelineConfig pipeline;
   LoggingConfig logging;

@@ -18,6 +18,10 @@ namespace {
 void check_rules(StrictReader& reader, const Config& c) {
   reader.require(c.source.kind != SourceKind::Replay || !c.source.replay.sequence.empty(),
                  {"source.kind", "source.replay.sequence"}, "needs source.replay.sequence, the folder of a recording");
+  reader.require(
+      c.source.synthetic.people == 0 || c.source.synthetic.world == SyntheticWorldKind::Room,
+      {"source.synthetic.world", "source.synthetic.people"},
+      fmt::format("only the world \"room\" has people: source.synthetic.people ({}) must be 0 here", c.source.synthetic.people));
   reader.require(c.tracker.fast_threshold_minimum <= c.tracker.fast_threshold,
                  {"tracker.fast_threshold_minimum", "tracker.fast_threshold"},
                  fmt::format("tracker.fast_threshold_minimum ({}) must be at most tracker.fast_threshold ({})",
@@ -31,6 +35,8 @@ void check_rules(StrictReader& reader, const Config& c) {
   reader.require(c.mapper.recovery_keyframes <= c.mapper.max_keyframes, {"mapper.recovery_keyframes", "mapper.max_keyframes"},
                  fmt::format("mapper.recovery_keyframes ({}) must be at most mapper.max_keyframes ({})",
                              c.mapper.recovery_keyframes, c.mapper.max_keyframes));
+  reader.require(c.map.mode != MapMode::Localization || !c.map.file.empty(), {"map.mode", "map.file"},
+                 "needs map.file, the map to localize in");
   reader.require(c.pipeline.frame_slots >= c.pipeline.frame_queue + 2, {"pipeline.frame_slots", "pipeline.frame_queue"},
                  fmt::format("pipeline.frame_slots ({}) must be at least pipeline.frame_queue ({}) + 2", c.pipeline.frame_slots,
                              c.pipeline.frame_queue));
@@ -88,6 +94,7 @@ Result<Config> read_config(const std::string& text, const std::filesystem::path&
   check_thread(reader, "pipeline.publisher", config.pipeline.publisher);
   resolve_path(name.parent_path(), config.source.replay.sequence);
   resolve_path(name.parent_path(), config.source.replay.associations);
+  resolve_path(name.parent_path(), config.map.file);
   read_calibration(reader, std::move(folders), config);
   return reader.status().map([&] { return config; });
 }

@@ -92,7 +92,7 @@ class SchemaBuilder {
 void add_source(SchemaBuilder& schema, SourceConfig& c) {
   schema.section("source", "Where frames come from and how fast.")
       .key("kind", choice(c.kind, {{"synthetic", SourceKind::Synthetic}, {"replay", SourceKind::Replay}}), "",
-           "`synthetic` renders a room with walking people; `replay` reads a recording.")
+           "`synthetic` renders a world, such as a room with walking people; `replay` reads a recording.")
       .key("pacing", choice(c.pacing, {{"realtime", Pacing::Realtime}, {"lockstep", Pacing::Lockstep}}), "",
            "`realtime` delivers frames when their stamps say and drops what cannot be kept up with; `lockstep` processes every "
            "frame, as "
@@ -109,12 +109,21 @@ void add_source(SchemaBuilder& schema, SourceConfig& c) {
       .key("decode_ahead", integer(c.replay.decode_ahead, 1, 64), "frames",
            "Images decoded before they are due, on a thread of their own.")
       .key("loop", BoolField{&c.replay.loop}, "", "Begin again at the end of the recording.");
-  schema.section("source.synthetic", "The rendered room, for `kind = \"synthetic\"`. Its image size is the calibration's.")
+  schema.section("source.synthetic", "The rendered world, for `kind = \"synthetic\"`. Its image size is the calibration's.")
+      .key("world",
+           choice(c.synthetic.world, {{"room", SyntheticWorldKind::Room},
+                                      {"corridor", SyntheticWorldKind::Corridor},
+                                      {"office", SyntheticWorldKind::Office},
+                                      {"twin_rooms", SyntheticWorldKind::TwinRooms}}),
+           "",
+           "Where the camera is: `room` sweeps the view once around a furnished room in 60 s; the others are walked through, round "
+           "after round: `corridor` is a ring, 30 m and 45 s a round; `office` has 10 x 8 m, desks and partitions, 43 s a round; "
+           "`twin_rooms` are two rooms that look exactly alike, joined by a corridor, 40 s a round.")
       .key("mode", choice(c.synthetic.mode, {{"sitting", SyntheticMode::Sitting}, {"walking", SyntheticMode::Walking}}), "",
-           "What the people do: `sitting` moves heads and arms, `walking` crosses the view.")
-      .key("people", integer(c.synthetic.people, 0, 20), "", "People in the room.")
+           "What the people in the room do: `sitting` moves heads and arms, `walking` crosses the view.")
+      .key("people", integer(c.synthetic.people, 0, 20), "", "People in the room; the other worlds have none, and need 0.")
       .key("seed", integer(c.synthetic.seed, 0, std::numeric_limits<std::int64_t>::max()), "",
-           "Of the random room, motion and noise: the same seed renders the same frames.")
+           "Of the random world, motion and noise: the same seed renders the same frames.")
       .key("rate_hz", real(c.synthetic.rate_hz, 1.0, 240.0), "Hz", "Frame rate.")
       .key("duration_s", real(c.synthetic.duration_s, 0.0, 1e6), "s", "Length of the simulation; 0 is endless.")
       .key("sensor_noise", BoolField{&c.synthetic.sensor_noise}, "",
@@ -149,18 +158,48 @@ void add_tracker(SchemaBuilder& schema, TrackerConfig& c) {
            "A pose that fewer landmarks agree with is not trusted and the state becomes lost. Less than `features`.")
       .key("keyframe_max_interval", integer(c.keyframe_max_interval, 1, 1000), "frames", "A keyframe is made at least this often.")
       .key("keyframe_inlier_ratio", real(c.keyframe_inlier_ratio, 0.1, 1.0), "",
-           "A keyframe is made when less than this share of the reference keyframe's landmarks is seen.");
+           "A keyframe is made when less than this share of the reference keyframe's landmarks is seen.")
+      .key("new_map_after_s", real(c.new_map_after_s, 0.1, 1e6), "s",
+           "Lost for so long, the tracker begins a new map; it is joined with the old one when they meet.");
 }
 
 void add_mapper(SchemaBuilder& schema, MapperConfig& c) {
   schema.section("mapper", "The map of keyframes and landmarks.")
-      .key("max_keyframes", integer(c.max_keyframes, 2, 10000), "keyframes", "Keyframes kept in the map.")
+      .key("max_keyframes", integer(c.max_keyframes, 2, 10000), "keyframes",
+           "Keyframes kept, about 150 kB each with their landmarks; of more, those go that tell least.")
+      .key("max_landmarks", integer(c.max_landmarks, 1000, 5'000'000), "landmarks",
+           "Landmarks kept; of more, those go that were seen least.")
       .key("local_landmarks", integer(c.local_landmarks, 100, 50000), "landmarks",
            "Most landmarks of the local map that the tracker matches against.")
       .key("local_keyframes", integer(c.local_keyframes, 1, 1000), "keyframes",
            "Keyframes whose landmarks make the local map. At most `max_keyframes`.")
       .key("recovery_keyframes", integer(c.recovery_keyframes, 1, 1000), "keyframes",
-           "Recent keyframes that a lost tracker matches against. At most `max_keyframes`.");
+           "Keyframes of the local map that a lost tracker matches against at once. At most `max_keyframes`.")
+      .key("bundle_keyframes", integer(c.bundle_keyframes, 0, 200), "keyframes",
+           "Keyframes that a local bundle adjustment moves. 0: none is made.")
+      .key("bundle_iterations", integer(c.bundle_iterations, 1, 50), "iterations",
+           "Most iterations of a local bundle adjustment, in each of its two rounds.")
+      .key("bundle_budget_s", real(c.bundle_budget_s, 0.001, 10.0), "s",
+           "A local bundle adjustment is given up after this time, or when a keyframe waits. It keeps what it has reached. Without "
+           "effect in lockstep.")
+      .key("loop_closing", BoolField{&c.loop_closing}, "", "Look for places that were seen before, and correct the map by them.")
+      .key("loop_max_drift", real(c.loop_max_drift, 0.001, 1.0), "",
+           "Largest drift to be believed, as a share of the path travelled since the place was seen: a closure that asks for more "
+           "is taken for a place that looks alike, and refused.");
+}
+
+void add_map(SchemaBuilder& schema, MapConfig& c) {
+  schema.section("map", "The map's file: loaded at start, saved at shutdown, periodically, and on SIGUSR1 or a message.")
+      .key("file", TextField{&c.file, {"the path of a file, or \"\"", is_path}}, "",
+           "A relative path starts at this file's folder. Where it does not exist yet a new map begins; one that is damaged or was "
+           "made "
+           "with another camera is refused and never overwritten. Empty: maps are neither loaded nor saved.")
+      .key("save_period_s", real(c.save_period_s, 0.0, 1e6), "s",
+           "Time between two saves while there is something new; 0: the map is saved at shutdown and on request alone. In "
+           "`lockstep` there "
+           "are none either.")
+      .key("mode", choice(c.mode, {{"mapping", MapMode::Mapping}, {"localization", MapMode::Localization}}), "",
+           "`mapping` extends the map; `localization` uses the map of `file`, and neither changes nor saves it.");
 }
 
 void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {
@@ -211,6 +250,7 @@ Schema config_schema(Config& config) {
   add_camera(schema, config.camera);
   add_tracker(schema, config.tracker);
   add_mapper(schema, config.mapper);
+  add_map(schema, config.map);
   add_publisher(schema, config.publisher);
   add_pipeline(schema, config.pipeline);
   schema.section("logging", "Messages for people, on standard error.")

@@ -93,7 +93,7 @@ void StrictReader::note_unknown(const TomlEntry& entry) {
     }
     for (const SchemaKey& key : section.keys) {
       candidates.push_back(key.name);
-      if (entry.key.size() > section.name.size() && entry.key.starts_with(section.name) &&
+      if (entry.key.size() > section.name.size() && entry.key.starts_with(section.name) && entry.key[section.name.size()] == '.' &&
           entry.key.find('.', section.name.size()) == entry.key.rfind('.')) {
         neighbours.emplace_back(leaf_of(key.name));
       }

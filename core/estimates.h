@@ -29,7 +29,7 @@ struct PoseEstimate {
 
   /// Valid only where `state == Tracking`; identity otherwise, and never published then.
   Se3 T_odom_camera;
-  Se3 T_map_odom;  ///< identity until a loop closes
+  Se3 T_map_odom;  ///< identity at the start; every correction of the map is in it
   /// Covariance of xi = (phi, rho) [rad, m] where the true pose is T_map_camera * exp(xi): rotation first, in the camera frame.
   Matrix6d covariance = Matrix6d::Zero();
 
@@ -38,7 +38,8 @@ struct PoseEstimate {
   std::int32_t inliers = 0;    ///< landmarks the pose rests on
   std::uint32_t map_id = 0;
   std::uint64_t map_version = 0;  ///< of the snapshot that was used
-  bool keyframe = false;          ///< the frame was handed to the mapper
+  bool keyframe = false;          ///< the frame was handed to the mapper as a keyframe
+  bool asks_where = false;        ///< the frame was handed to the mapper to be relocalised
   TimeNs detection_age_ns = -1;   ///< age of the person detections used; -1 where none were
 
   /// The keyframe this pose hangs on, and the pose relative to it: what a final trajectory is rebuilt from after the map has moved.

@@ -6,63 +6,13 @@
 #include <string>
 #include <system_error>
 #include <unistd.h>
-#include <utility>
 
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include "core/file_descriptor.h"
+
 namespace posed {
-
-namespace {
-
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int fd) : fd_(fd) {}
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  ~FileDescriptor() {
-    if (fd_ >= 0) {
-      ::close(fd_);
-    }
-  }
-
-  int get() const { return fd_; }
-
-  /// Closes it with the error that a file system may have kept until now (quota, network).
-  int close() {
-    const int fd = std::exchange(fd_, -1);
-    return ::close(fd) == 0 ? 0 : errno;
-  }
-
- private:
-  int fd_;
-};
-
-tl::unexpected<Error> system_error(const char* action, const std::filesystem::path& path, int error) {
-  const bool missing = error == ENOENT || error == ENOTDIR;
-  std::string hint;
-  if (error == ENOSPC || error == EDQUOT) {
-    hint = "; free some space or choose another folder";
-  }
-  return make_error(missing ? ErrorCode::NotFound : ErrorCode::Io,
-                    fmt::format("cannot {} {}: {}{}", action, path.string(), std::generic_category().message(error), hint));
-}
-
-/// 0, or the error number. A disk that fills up in the middle of a write first writes a part and reports with the next call.
-int write_all(int fd, std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
-    if (written < 0 && errno != EINTR) {
-      return errno;
-    }
-    if (written > 0) {
-      bytes = bytes.subspan(static_cast<std::size_t>(written));
-    }
-  }
-  return 0;
-}
-
-}  // namespace
 
 Status read_file(const std::filesystem::path& path, std::vector<std::uint8_t>& bytes, std::size_t max_bytes) {
   // Without O_NONBLOCK, opening a named pipe that nobody writes to would wait for ever.

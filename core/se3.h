@@ -27,6 +27,14 @@ class Se3 {
   Se3(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation)
       : rotation_(rotation.normalized()), translation_(translation) {}
 
+  /// From a quaternion of unit length to rounding, which is kept bit by bit: for transforms that were saved.
+  static Se3 from_unit(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+    Se3 T;
+    T.rotation_ = rotation;
+    T.translation_ = translation;
+    return T;
+  }
+
   static Se3 exp(const Vector6d& xi);
   Vector6d log() const;
 

@@ -8,6 +8,13 @@
 
 namespace posed {
 
+MapFiles map_files(const MapConfig& config) {
+  if (config.mode == MapMode::Localization) {
+    return {config.file, false, ""};
+  }
+  return {config.file, true, config.file};
+}
+
 Result<std::unique_ptr<App>> App::create(const Config& config, AppOptions options, const Clock& clock) {
   Result<std::unique_ptr<RgbdSource>> source = make_rgbd_source(config.source, config.intrinsics, clock);
   if (!source) {

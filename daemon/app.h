@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "config/config.h"
 #include "core/clock.h"
@@ -14,6 +15,16 @@
 
 namespace posed {
 
+/// Where the map comes from and goes to.
+struct MapFiles {
+  std::string load;             ///< empty: nothing is loaded
+  bool may_be_missing = false;  ///< `load` need not exist: a new map then begins
+  std::string save;             ///< empty: nothing is saved
+};
+
+/// What a configuration says of them: the daemon's files.
+MapFiles map_files(const MapConfig& config);
+
 struct AppOptions {
   bool publish = true;  ///< start LCM; false for tools that only want the trajectory
   /// Called for every frame the tracker processed, in order, after it was published, on the publisher thread. May block for short
@@ -21,15 +32,17 @@ struct AppOptions {
   std::function<void(const PoseEstimate&)> on_estimate;
   /// Called when the source skips a bad frame or fails, on the capture thread, with the reason.
   std::function<void(const Error&)> on_source_error;
+  std::optional<MapFiles> map_files;  ///< instead of those of the configuration
 };
 
 /// The pipeline: the one place that owns the threads and wires source, tracker, mapper and publisher together (docs/threads.md).
 /// The daemon and `posectl replay` run this same class. With Pacing::Realtime every stage has its own thread. With Pacing::Lockstep
 /// capture, tracking and mapping take turns on one thread, so that nothing is dropped and the result is a function of the input
-/// alone. Thread-bound to the thread that made it, but for `health`, which is thread-safe.
+/// alone. Thread-bound to the thread that made it, but for `health` and `request_map_save`, which are thread-safe.
 class App {
  public:
-  /// Opens the source and allocates everything. Nothing runs yet.
+  /// Opens the source, allocates everything and loads the map. Nothing runs yet. A map that cannot be used is an error
+  /// (InvalidConfig), so that none is ever overwritten by a new one.
   static Result<std::unique_ptr<App>> create(const Config& config, AppOptions options, const Clock& clock);
   virtual ~App() = default;
 
@@ -45,6 +58,10 @@ class App {
   virtual void stop() = 0;
 
   virtual HealthReport health() const = 0;
+
+  /// Has the map saved soon, on the mapping thread; the log and `health` say what came of it. Error: InvalidConfig, where no file
+  /// is configured.
+  virtual Status request_map_save() = 0;
 
   /// After `stop`: the present pose of a keyframe, to rebuild the final trajectory as T_map_keyframe * T_reference_camera.
   virtual std::optional<Se3> keyframe_pose(std::uint64_t keyframe) const = 0;

@@ -30,7 +30,7 @@ std::string_view exit_code_table() noexcept {
          "      with --exit-at-end also: the source failed\n"
          "  70  an error inside the program: please report it\n"
          "  74  the operating system refused to read, write or open\n"
-         "  78  the configuration is wrong; nothing was touched";
+         "  78  the configuration is wrong (nothing was touched), or the map it names cannot be used";
 }
 
 }  // namespace posed

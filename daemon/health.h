@@ -30,6 +30,11 @@ struct HealthReport {
 
   std::size_t map_keyframes = 0;
   std::size_t map_landmarks = 0;
+  std::uint64_t loops_closed = 0;
+  std::uint64_t maps_joined = 0;
+  std::uint64_t relocalizations = 0;  ///< times that the place of a lost camera was found
+  std::uint64_t map_saves = 0;
+  std::uint64_t map_save_errors = 0;
 
   LatencySummary track;    ///< time in the tracker a frame
   LatencySummary latency;  ///< capture to publish

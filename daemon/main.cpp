@@ -35,7 +35,7 @@ int fail(const Error& error) {
 }
 
 int run_daemon(const Config& config, bool exit_at_end) {
-  if (const Status blocked = Supervisor::block_termination_signals(); !blocked) {
+  if (const Status blocked = Supervisor::block_signals(); !blocked) {
     return fail(blocked.error());
   }
   SupervisorOptions supervisor_options;

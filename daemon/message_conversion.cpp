@@ -130,6 +130,11 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.publish_errors = count(health.publish_errors);
   message.map_keyframes = count(health.map_keyframes);
   message.map_landmarks = count(health.map_landmarks);
+  message.map_saves = count(health.map_saves);
+  message.map_save_errors = count(health.map_save_errors);
+  message.loops_closed = count(health.loops_closed);
+  message.maps_joined = count(health.maps_joined);
+  message.relocalizations = count(health.relocalizations);
   message.peak_rss_bytes = count(health.peak_rss_bytes);
   message.track = to_message(health.track);
   message.latency = to_message(health.latency);

@@ -29,6 +29,15 @@ Status LcmTransport::open() {
   if (!opened->good()) {
     return make_error(ErrorCode::Unavailable, fmt::format("LCM cannot start on '{}': {}", url_, how_to_mend(url_)));
   }
+  for (const std::unique_ptr<Subscription>& subscription : subscriptions_) {
+    // Not the overload for member functions: gcc 12 with the undefined-behaviour sanitizer compiles its call wrongly.
+    opened->subscribeFunction(
+        subscription->channel,
+        +[](const lcm::ReceiveBuffer* received, const std::string&, Subscription* to) {
+          to->handler({static_cast<const std::uint8_t*>(received->data), received->data_size});
+        },
+        subscription.get());
+  }
   lcm_ = std::move(opened);
   return {};
 }
@@ -39,6 +48,16 @@ Status LcmTransport::send(const std::string& channel, std::span<const std::uint8
                                                  url_, how_to_mend(url_)));
   }
   return {};
+}
+
+void LcmTransport::subscribe(const std::string& channel, Handler handler) {
+  subscriptions_.push_back(std::make_unique<Subscription>(Subscription{channel, std::move(handler)}));
+}
+
+void LcmTransport::receive() {
+  constexpr int kAtMost = 16;  // so that a flood of requests does not keep poses waiting
+  for (int i = 0; i < kAtMost && !subscriptions_.empty() && lcm_->handleTimeout(0) > 0; ++i) {
+  }
 }
 
 }  // namespace posed

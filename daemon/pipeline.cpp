@@ -14,6 +14,8 @@
 #include "core/thread.h"
 #include "core/wake_event.h"
 #include "daemon/capture_stage.h"
+#include "daemon/map_requests.h"
+#include "daemon/map_saver.h"
 #include "daemon/mapping_stage.h"
 #include "daemon/publish_stage.h"
 #include "daemon/stage_link.h"
@@ -68,12 +70,23 @@ class Pipeline final : public App {
         capture_(*parts_.source, pool_, std::move(options.on_source_error)),
         tracking_(*parts_.tracker, {links_.snapshots, links_.keyframes, links_.estimates}, clock,
                   is_lockstep() ? FullQueue::Waits : FullQueue::DropsOldest),
-        mapping_(*parts_.mapper, links_.keyframes, links_.snapshots, clock),
+        saver_(*parts_.mapper, options.map_files.value_or(map_files(config.map)),
+               is_lockstep() ? 0 : from_seconds(config.map.save_period_s), clock),
+        mapping_(*parts_.mapper, links_.keyframes, links_.snapshots, saver_, clock),
         publish_(links_.estimates, make_publisher(clock), std::move(options.on_estimate), clock) {}
 
   ~Pipeline() override {
     stop();
     parts_.source.reset();  // before the pool, whose slots it may hold
+  }
+
+  /// Before `start`.
+  Status load_map() {
+    return saver_.load().map([this](bool loaded) {
+      if (loaded) {
+        mapping_.publish_map();
+      }
+    });
   }
 
   const SourceInfo& source_info() const override { return parts_.source->info(); }
@@ -128,6 +141,13 @@ class Pipeline final : public App {
     return health;
   }
 
+  Status request_map_save() override {
+    return saver_.can_save().map([this] {
+      saver_.request();
+      links_.keyframes.wake_all();
+    });
+  }
+
   std::optional<Se3> keyframe_pose(std::uint64_t keyframe) const override { return parts_.mapper->keyframe_pose(keyframe); }
 
  private:
@@ -137,8 +157,17 @@ class Pipeline final : public App {
     if (!parts_.transport) {
       return nullptr;
     }
-    return std::make_unique<Publisher>(config_.publisher, config_.camera.T_base_camera, std::move(parts_.transport), clock,
-                                       [this] { return health(); });
+    return std::make_unique<Publisher>(
+        config_.publisher, config_.camera.T_base_camera, std::move(parts_.transport), clock, [this] { return health(); },
+        make_map_requests(clock));
+  }
+
+  std::unique_ptr<MapRequests> make_map_requests(const Clock& clock) {
+    if (!saver_.has_files()) {
+      return nullptr;  // so that liblcm need not listen
+    }
+    return std::make_unique<MapRequests>(
+        saver_, [this] { links_.keyframes.wake_all(); }, clock);
   }
 
   // Consumers before producers, so that the first frame finds everybody there.
@@ -153,8 +182,7 @@ class Pipeline final : public App {
       return;
     }
     threads_[1] = NamedThread(thread_options("mapper", pipeline.mapper), [this](const std::stop_token& stop) {
-      mapping_.run(stop);
-      mark_drained(keyframes_drained_);
+      mapping_.run(stop, [this] { mark_drained(keyframes_drained_); });
     });
     threads_[2] = NamedThread(thread_options("tracker", pipeline.tracker),
                               [this](const std::stop_token& stop) { tracking_.run(stop, links_.frames); });
@@ -174,8 +202,10 @@ class Pipeline final : public App {
         }
       }
     }
-    mark_drained(keyframes_drained_);
-    tracking_.close_outputs();
+    mapping_.finish(stop, [this] {
+      mark_drained(keyframes_drained_);
+      tracking_.close_outputs();
+    });
   }
 
   void mark_drained(std::atomic<bool>& drained) {
@@ -190,6 +220,7 @@ class Pipeline final : public App {
 
   CaptureStage capture_;
   TrackingStage tracking_;
+  MapSaver saver_;
   MappingStage mapping_;
   PublishStage publish_;
 
@@ -227,7 +258,11 @@ Result<std::unique_ptr<App>> make_pipeline(const Config& config, AppOptions opti
   if (const Status checked = check(config, parts); !checked) {
     return tl::unexpected<Error>(checked.error());
   }
-  return std::make_unique<Pipeline>(config, std::move(options), clock, std::move(parts));
+  auto pipeline = std::make_unique<Pipeline>(config, std::move(options), clock, std::move(parts));
+  if (const Status loaded = pipeline->load_map(); !loaded) {
+    return tl::unexpected<Error>(loaded.error());
+  }
+  return pipeline;
 }
 
 }  // namespace posed

@@ -20,8 +20,8 @@ struct PipelineParts {
   std::unique_ptr<MessageTransport> transport;  ///< null: nothing is published
 };
 
-/// `App::create` with parts of the caller's choice. Error: InvalidConfig, where a queue or the pool of the configuration has no
-/// place.
+/// `App::create` with parts of the caller's choice. Errors: InvalidConfig, where a queue or the pool of the configuration
+/// has no place, or the map cannot be used; NotFound and Io of the map's file.
 Result<std::unique_ptr<App>> make_pipeline(const Config& config, AppOptions options, const Clock& clock, PipelineParts parts);
 
 }  // namespace posed

@@ -12,15 +12,20 @@
 namespace posed {
 
 Publisher::Publisher(const PublisherConfig& config, const Se3& T_base_camera, std::unique_ptr<MessageTransport> transport,
-                     const Clock& clock, std::function<HealthReport()> health)
+                     const Clock& clock, std::function<HealthReport()> health, std::unique_ptr<MapRequests> requests)
     : config_(config),
-      channels_{config.channel_prefix + "POSE", config.channel_prefix + "STATUS", config.channel_prefix + "BOT_POSE"},
+      channels_{config.channel_prefix + "POSE", config.channel_prefix + "STATUS", config.channel_prefix + "BOT_POSE",
+                config.channel_prefix + "MAP_REQUEST", config.channel_prefix + "MAP_REPLY"},
       T_base_camera_(T_base_camera),
       transport_(std::move(transport)),
       clock_(clock),
       health_(std::move(health)),
-      next_open_ns_(std::numeric_limits<TimeNs>::min()),
-      next_status_ns_(std::numeric_limits<TimeNs>::min()) {}
+      requests_(std::move(requests)),
+      times_{0, std::numeric_limits<TimeNs>::min(), std::numeric_limits<TimeNs>::min()} {
+  if (requests_) {
+    transport_->subscribe(channels_.map_request, [this](std::span<const std::uint8_t> message) { requests_->receive(message); });
+  }
+}
 
 void Publisher::publish(const PoseEstimate& estimate, TimeNs publish_ns) {
   if (send(channels_.pose, to_pose_message(estimate, T_base_camera_, publish_ns))) {
@@ -35,14 +40,24 @@ void Publisher::publish(const PoseEstimate& estimate, TimeNs publish_ns) {
 
 TimeNs Publisher::do_due_work() {
   const TimeNs now_ns = clock_.now_ns();
-  if (!open_ && now_ns >= next_open_ns_) {
+  if (!open_ && now_ns >= times_.next_open_ns) {
     open_transport(now_ns);
   }
-  if (now_ns >= next_status_ns_) {
+  if (now_ns >= times_.next_status_ns) {
     publish_status();
-    next_status_ns_ = now_ns + from_seconds(config_.status_period_s);
+    times_.next_status_ns = now_ns + from_seconds(config_.status_period_s);
   }
-  return open_ ? next_status_ns_ : std::min(next_status_ns_, next_open_ns_);
+  if (open_ && requests_) {
+    answer_requests();
+  }
+  return open_ ? times_.next_status_ns : std::min(times_.next_status_ns, times_.next_open_ns);
+}
+
+void Publisher::answer_requests() {
+  transport_->receive();
+  for (const map_reply_t& reply : requests_->take_replies()) {
+    send(channels_.map_reply, reply);
+  }
 }
 
 void Publisher::publish_status() {
@@ -63,7 +78,7 @@ void Publisher::report(HealthReport& health) const {
 void Publisher::open_transport(TimeNs now_ns) {
   const Status opened = transport_->open();
   open_ = opened.has_value();
-  next_open_ns_ = now_ns + from_seconds(config_.retry_period_s);
+  times_.next_open_ns = now_ns + from_seconds(config_.retry_period_s);
   note(opened);
 }
 
@@ -86,12 +101,12 @@ bool Publisher::send(const std::string& channel, const Message& message) {
 void Publisher::note(const Status& outcome) {
   up_.store(outcome.has_value(), std::memory_order_relaxed);
   if (!outcome) {
-    last_failure_ns_ = clock_.now_ns();
+    times_.last_failure_ns = clock_.now_ns();
     if (!complained_) {
       complained_ = true;
       log_warning("{}. Tracking goes on; this is said once until publishing works again", outcome.error().message);
     }
-  } else if (complained_ && clock_.now_ns() - last_failure_ns_ >= from_seconds(config_.retry_period_s)) {
+  } else if (complained_ && clock_.now_ns() - times_.last_failure_ns >= from_seconds(config_.retry_period_s)) {
     complained_ = false;  // after a quiet period only: an error that comes and goes must not fill the log
     log_info("publishing on '{}' works again", transport_->description());
   }

@@ -2,12 +2,15 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "config/config.h"
 #include "core/estimates.h"
+#include "core/result.h"
 #include "core/rgbd_frame.h"
 #include "slam/keyframe_record.h"
 #include "slam/map_snapshot.h"
+#include "slam/mapper.h"
 
 namespace posed {
 
@@ -19,15 +22,23 @@ class FrameTracker {
   virtual PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) = 0;
 };
 
-/// The mapper as the pipeline sees it (slam/local_mapper.h). Thread-bound.
+/// The mapper as the pipeline sees it (slam/mapper.h). Thread-bound.
 class KeyframeMapper {
  public:
   virtual ~KeyframeMapper() = default;
   virtual void insert(const KeyframeRecord& record) = 0;
+  virtual bool improve(const Interrupt& interrupt) = 0;
   virtual void write_snapshot(MapSnapshot& snapshot) const = 0;
   virtual std::optional<Se3> keyframe_pose(KeyframeId id) const = 0;
   virtual std::size_t keyframe_count() const = 0;
   virtual std::size_t landmark_count() const = 0;
+  virtual MapperCounters counters() const = 0;
+
+  /// Replaces the file `path` by the present map (slam/map_io.h, also for the errors).
+  virtual Status save(const std::string& path) = 0;
+
+  /// Begins with the map of the file `path`; before any keyframe.
+  virtual Status load(const std::string& path) = 0;
 };
 
 /// The real ones. Reentrant.

@@ -24,11 +24,11 @@ void notify_systemd(const std::string& state) {
 
 }  // namespace
 
-/// sd-event with the two things the daemon waits for: a signal that ends it, and the time to look.
+/// sd-event with what the daemon waits for: a signal that ends it, the signal to save the map, and the time to look.
 class Supervisor::EventLoop {
  public:
-  EventLoop(TimeNs period_ns, std::function<bool()> look)
-      : period_us_(static_cast<std::uint64_t>(period_ns / kNsPerUs)), look_(std::move(look)) {}
+  EventLoop(TimeNs period_ns, std::function<bool()> look, std::function<void()> save_map)
+      : period_us_(static_cast<std::uint64_t>(period_ns / kNsPerUs)), look_(std::move(look)), save_map_(std::move(save_map)) {}
 
   /// The signal that ended the loop, or 0 where `look` did.
   Result<int> run() {
@@ -39,6 +39,9 @@ class Supervisor::EventLoop {
       if (status >= 0) {
         status = sd_event_add_signal(event, nullptr, signal, &EventLoop::on_signal, nullptr);
       }
+    }
+    if (status >= 0) {
+      status = sd_event_add_signal(event, nullptr, SIGUSR1, &EventLoop::on_save_signal, this);
     }
     if (status >= 0) {
       status = sd_event_add_time_relative(event, nullptr, CLOCK_MONOTONIC, period_us_, kAccuracyUs, &EventLoop::on_time, this);
@@ -59,6 +62,11 @@ class Supervisor::EventLoop {
     return sd_event_exit(sd_event_source_get_event(source), static_cast<int>(info->ssi_signo));
   }
 
+  static int on_save_signal(sd_event_source*, const signalfd_siginfo*, void* self) {
+    static_cast<EventLoop*>(self)->save_map_();
+    return 0;
+  }
+
   static int on_time(sd_event_source* source, std::uint64_t, void* self) {
     auto* const loop = static_cast<EventLoop*>(self);
     if (loop->look_()) {
@@ -70,15 +78,17 @@ class Supervisor::EventLoop {
 
   std::uint64_t period_us_;
   std::function<bool()> look_;
+  std::function<void()> save_map_;
 };
 
 Supervisor::Supervisor(SupervisorOptions options) : options_(options), source_errors_(kSourceErrorsKept) {}
 
-Status Supervisor::block_termination_signals() {
+Status Supervisor::block_signals() {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGUSR1);
   if (const int error = pthread_sigmask(SIG_BLOCK, &signals, nullptr); error != 0) {
     return make_error(ErrorCode::Unavailable, fmt::format("the signals cannot be blocked: {}", std::strerror(error)));
   }
@@ -102,7 +112,8 @@ Result<RunEnd> Supervisor::run(App& app) {
   last_log_ns_ = SystemClock::instance().now_ns();
   next_health_log_ns_ = last_log_ns_ + options_.health_log_period_ns;
 
-  EventLoop loop(options_.poll_period_ns, [&] { return look(app); });
+  EventLoop loop(
+      options_.poll_period_ns, [&] { return look(app); }, [&] { save_map(app); });
   const Result<int> ended_by = loop.run();
 
   notify_systemd("STOPPING=1\nSTATUS=stopping");
@@ -141,6 +152,12 @@ bool Supervisor::look(App& app) {
     log_info("the source has {}; every frame is processed", health.source_failed ? "failed" : "ended");
   }
   return source_done_ && options_.exit_at_end;
+}
+
+void Supervisor::save_map(App& app) {
+  if (const Status requested = app.request_map_save(); !requested) {
+    log_warning("SIGUSR1: {}", requested.error().message);
+  }
 }
 
 void Supervisor::log_source_errors() {

@@ -20,16 +20,17 @@ struct SupervisorOptions {
 /// Why a run ended.
 enum class RunEnd { Signal, SourceEnded, SourceFailed };
 
-/// The main thread's part: runs the pipeline under sd-event until a signal (SIGINT, SIGTERM) or the end of the source, writes the
+/// The main thread's part: runs the pipeline under sd-event until a signal (SIGINT, SIGTERM) or the end of the source, has the map
+/// saved on SIGUSR1, writes the
 /// log that the pipeline's threads must not write, and tells systemd how things stand where $NOTIFY_SOCKET is set. Thread-bound to
 /// the main thread. Must outlive the App that was given its `source_error_sink`.
 class Supervisor {
  public:
   explicit Supervisor(SupervisorOptions options);
 
-  /// Blocks the signals that end the daemon in the calling thread and those it starts, so that the event loop alone receives them:
-  /// call it before any thread exists.
-  static Status block_termination_signals();
+  /// Blocks the signals that the daemon acts on in the calling thread and those it starts, so that the event loop alone receives
+  /// them: call it before any thread exists.
+  static Status block_signals();
 
   /// For AppOptions::on_source_error: passes errors from the capture thread to the log without waiting for the log.
   std::function<void(const Error&)> source_error_sink();
@@ -42,6 +43,7 @@ class Supervisor {
 
   /// Logs what happened since the last look; true where the run has come to its end.
   bool look(App& app);
+  static void save_map(App& app);
   void log_source_errors();
   void log_health(const HealthReport& health);
 

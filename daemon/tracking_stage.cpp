@@ -21,8 +21,8 @@ void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
   track_time_.record(estimate.track_ns);
   state_.store(estimate.state, std::memory_order_relaxed);
   (estimate.has_pose() ? tracked_ : lost_).add();
-  if (estimate.keyframe && candidate != nullptr) {
-    keyframes_.add();
+  if ((estimate.keyframe || estimate.asks_where) && candidate != nullptr) {
+    keyframes_.add(estimate.keyframe ? 1 : 0);
     outputs_.keyframes.ring.commit();
     outputs_.keyframes.notify_arrived();
   }

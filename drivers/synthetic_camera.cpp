@@ -16,6 +16,13 @@ Status check(const SyntheticConfig& config, const CameraIntrinsics& camera) {
     return make_error(ErrorCode::InvalidArgument,
                       fmt::format("source.synthetic.people = {}: 0 to {} are possible", config.people, SyntheticWorld::kMaxPeople));
   }
+  if (config.people > 0 && config.world != SyntheticWorldKind::Room) {
+    return make_error(
+        ErrorCode::InvalidArgument,
+        fmt::format("source.synthetic.people = {}: only source.synthetic.world = \"room\" has people, \"{}\" has none; "
+                    "set people to 0",
+                    config.people, world_name(config.world)));
+  }
   if (!(config.rate_hz > 0.0) || !std::isfinite(config.rate_hz)) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("source.synthetic.rate_hz = {}: must be above 0", config.rate_hz));
   }

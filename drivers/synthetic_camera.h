@@ -21,7 +21,8 @@ class SyntheticCamera {
   /// 2023-11-14 22:13:20 UTC: `stamp_utc_ns` of frame 0, fixed so that recordings are identical.
   static constexpr std::int64_t kEpochUtc_ns = 1'700'000'000'000'000'000;
 
-  /// Errors: InvalidArgument (people, rate, duration or image size out of range). Paints the world: tenths of a second.
+  /// Errors: InvalidArgument (people, rate, duration or image size out of range, or people in a world without them). Paints the
+  /// world: tenths of a second.
   static Result<std::unique_ptr<SyntheticCamera>> create(const SyntheticConfig& config, const CameraIntrinsics& camera);
 
   /// Renders frame `index` into views of the camera's size and sets sequence, stamp_utc_ns and T_world_camera_truth; capture_ns

@@ -1,105 +1,16 @@
 #include "drivers/synthetic_materials.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "drivers/synthetic_hash.h"
+#include "drivers/synthetic_motifs.h"
 #include "drivers/synthetic_painter.h"
 
 namespace posed {
 
 namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
-constexpr float kCoarseTexel_m = 0.005F;
-constexpr float kFineTexel_m = 0.0025F;
-
-/// Hue in [0, 1) on the colour circle, saturation and brightness in 0..1.
-Colour from_hue(float hue, float saturation, float brightness) {
-  const auto channel = [&](float offset) {
-    const float position = hue + offset - std::floor(hue + offset);
-    const float ramp = std::clamp(std::abs(position * 6.0F - 3.0F) - 1.0F, 0.0F, 1.0F);
-    return 255.0F * brightness * (1.0F - saturation * (1.0F - ramp));
-  };
-  return {.b = channel(1.0F / 3.0F), .g = channel(2.0F / 3.0F), .r = channel(0.0F)};
-}
-
-Colour any_colour(HashRng& rng, float saturation, float dark, float bright) {
-  const float hue = rng.uniform();
-  const float strength = saturation * rng.uniform(0.3F, 1.0F);
-  return from_hue(hue, strength, rng.uniform(dark, bright));
-}
-
-/// Sizes spread evenly over the octaves between `low` and `high`.
-float any_size(HashRng& rng, float low, float high) {
-  return low * std::pow(high / low, rng.uniform());
-}
-
-Eigen::Vector2f any_point(HashRng& rng, const TexturePainter& painter) {
-  const float x = rng.uniform(0, painter.width_m());
-  return {x, rng.uniform(0, painter.height_m())};
-}
-
-/// A rectangle, an ellipse or a triangle.
-void any_shape(TexturePainter& painter, HashRng& rng, Eigen::Vector2f centre, float size, Colour colour, float opacity) {
-  const float angle = rng.uniform(0, kPi);
-  const float aspect = rng.uniform(0.45F, 1.0F);
-  switch (rng.index(4)) {
-    case 0: painter.ellipse(centre, {size / 2, size / 2 * aspect}, angle, colour, opacity); break;
-    case 1: {
-      const auto corner = [&](float turn) -> Eigen::Vector2f {
-        return centre + 0.55F * size * Eigen::Vector2f(std::cos(angle + turn), aspect * std::sin(angle + turn));
-      };
-      painter.triangle(corner(0), corner(2.0F), corner(4.2F), colour, opacity);
-      break;
-    }
-    default: painter.rectangle(centre, {size / 2, size / 2 * aspect}, angle, colour, opacity); break;
-  }
-}
-
-void scatter(TexturePainter& painter, HashRng& rng, int count, float low_m, float high_m, float opacity, float saturation) {
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Vector2f centre = any_point(rng, painter);
-    const float size = any_size(rng, low_m, high_m);
-    const Colour colour = any_colour(rng, saturation, 0.1F, 1.0F);
-    any_shape(painter, rng, centre, size, colour, opacity);
-  }
-}
-
-/// Lines of made-up script: each glyph is a hash's bits on a grid of 3 x 4 cells.
-void print_text(TexturePainter& painter, HashRng& rng, Eigen::Vector2f origin, Eigen::Vector2f size, float cell_m, Colour ink) {
-  for (float y = origin.y(); y + 4 * cell_m <= origin.y() + size.y(); y += 6 * cell_m) {
-    for (float x = origin.x(); x + 3 * cell_m <= origin.x() + size.x(); x += 4 * cell_m) {
-      const std::uint32_t glyph = rng.next();
-      if ((glyph >> 28) < 2) {
-        continue;  // the gap between words
-      }
-      for (std::uint32_t bit = 0; bit < 12; ++bit) {
-        if ((glyph >> bit & 1U) != 0) {
-          const Eigen::Vector2f centre(x + (static_cast<float>(bit % 3) + 0.5F) * cell_m,
-                                       y + (static_cast<float>(bit / 3) + 0.5F) * cell_m);
-          painter.rectangle(centre, {cell_m * 0.55F, cell_m * 0.55F}, 0, ink);
-        }
-      }
-    }
-  }
-}
-
-int count_for(const TexturePainter& painter, float per_square_metre) {
-  return static_cast<int>(painter.width_m() * painter.height_m() * per_square_metre);
-}
-
-void frame_border(TexturePainter& painter, float width, Colour colour) {
-  const float w = painter.width_m();
-  const float h = painter.height_m();
-  painter.rectangle({w / 2, 0}, {w, width}, 0, colour);
-  painter.rectangle({w / 2, h}, {w, width}, 0, colour);
-  painter.rectangle({0, h / 2}, {width, h}, 0, colour);
-  painter.rectangle({w, h / 2}, {width, h}, 0, colour);
-}
 
 void paint_page(TexturePainter& painter, HashRng& rng) {
   const float w = painter.width_m();
@@ -115,8 +26,11 @@ void paint_page(TexturePainter& painter, HashRng& rng) {
       if (rng.index(3) == 0) {
         painter.rectangle({left + 0.21F * w, top + height / 2}, {0.21F * w, height * 0.45F}, 0, any_colour(rng, 0.9F, 0.3F, 0.9F));
         for (int i = 0; i < 5; ++i) {
-          const Eigen::Vector2f centre(left + rng.uniform(0.05F, 0.37F) * w, top + rng.uniform(0.2F, 0.8F) * height);
-          any_shape(painter, rng, centre, rng.uniform(0.04F, 0.12F) * w, any_colour(rng, 0.9F, 0.05F, 1.0F), 1.0F);
+          const float y = top + rng.uniform(0.2F, 0.8F) * height;
+          const float x = left + rng.uniform(0.05F, 0.37F) * w;
+          const Colour colour = any_colour(rng, 0.9F, 0.05F, 1.0F);
+          const float size = rng.uniform(0.04F, 0.12F) * w;
+          any_shape(painter, rng, {x, y}, size, colour, 1.0F);
         }
       } else {
         print_text(painter, rng, {left, top}, {0.42F * w, height - 0.02F * h}, 0.0065F + 0.004F * rng.uniform(), ink);
@@ -131,7 +45,8 @@ void paint_mosaic(TexturePainter& painter, HashRng& rng) {
   const float cell = rng.uniform(0.05F, 0.09F);
   for (float y = cell / 2; y < painter.height_m(); y += cell) {
     for (float x = cell / 2; x < painter.width_m(); x += cell) {
-      painter.rectangle({x, y}, {cell * 0.46F, cell * 0.46F}, rng.uniform(-0.1F, 0.1F), any_colour(rng, 0.9F, 0.15F, 1.0F));
+      const Colour colour = any_colour(rng, 0.9F, 0.15F, 1.0F);
+      painter.rectangle({x, y}, {cell * 0.46F, cell * 0.46F}, rng.uniform(-0.1F, 0.1F), colour);
       if (rng.index(3) == 0) {
         any_shape(painter, rng, {x, y}, cell * 0.5F, any_colour(rng, 0.9F, 0.05F, 1.0F), 1.0F);
       }
@@ -155,11 +70,13 @@ void paint_landscape(TexturePainter& painter, HashRng& rng) {
     painter.rectangle({w / 2, base + h / 2 + 0.2F * h}, {w, h / 2}, 0, slope);
   }
   for (int i = 0; i < 60; ++i) {  // houses with windows
-    const Eigen::Vector2f foot(rng.uniform(0, w), rng.uniform(0.55F, 0.97F) * h);
+    const float y = rng.uniform(0.55F, 0.97F) * h;
+    const Eigen::Vector2f foot(rng.uniform(0, w), y);
     const float size = rng.uniform(0.025F, 0.06F);
     painter.rectangle(foot, {size / 2, size / 2}, 0, any_colour(rng, 0.5F, 0.6F, 1.0F));
+    const float roof = rng.uniform(0.3F, 0.7F);
     painter.triangle(foot + Eigen::Vector2f(-0.6F * size, -size / 2), foot + Eigen::Vector2f(0.6F * size, -size / 2),
-                     foot + Eigen::Vector2f(0, -1.1F * size), from_hue(rng.uniform(0, 0.08F), 0.7F, rng.uniform(0.3F, 0.7F)));
+                     foot + Eigen::Vector2f(0, -1.1F * size), from_hue(rng.uniform(0, 0.08F), 0.7F, roof));
     painter.rectangle(foot, {size / 8, size / 8}, 0, from_hue(0.6F, 0.5F, 0.15F));
   }
 }
@@ -182,8 +99,11 @@ MipTexture paint_wall(float width_m, float height_m, std::uint32_t seed) {
   const int stencils = count_for(painter, 45.0F);
   for (int i = 0; i < stencils; ++i) {
     const Eigen::Vector2f centre = any_point(rng, painter);
-    const Colour colour = from_hue(hue + rng.uniform(-0.12F, 0.12F), rng.uniform(0.15F, 0.5F), rng.uniform(0.25F, 0.95F));
-    any_shape(painter, rng, centre, any_size(rng, 0.03F, 0.22F), colour, rng.uniform(0.4F, 0.9F));
+    const float brightness = rng.uniform(0.25F, 0.95F);
+    const float saturation = rng.uniform(0.15F, 0.5F);
+    const Colour colour = from_hue(hue + rng.uniform(-0.12F, 0.12F), saturation, brightness);
+    const float opacity = rng.uniform(0.4F, 0.9F);
+    any_shape(painter, rng, centre, any_size(rng, 0.03F, 0.22F), colour, opacity);
   }
   painter.darken_border(0.5F, 0.3F);
   return std::move(painter).finish();
@@ -266,12 +186,14 @@ MipTexture paint_cardboard(float width_m, float height_m, std::uint32_t seed) {
   const int labels = count_for(painter, 22.0F);
   for (int i = 0; i < labels; ++i) {
     const Eigen::Vector2f centre = any_point(rng, painter);
-    const Eigen::Vector2f half(rng.uniform(0.03F, 0.09F), rng.uniform(0.02F, 0.06F));
+    const float half_height = rng.uniform(0.02F, 0.06F);
+    const Eigen::Vector2f half(rng.uniform(0.03F, 0.09F), half_height);
     const bool bare = rng.index(2) == 0;
     if (!bare) {
       painter.rectangle(centre, half + Eigen::Vector2f::Constant(0.01F), 0, any_colour(rng, 0.6F, 0.5F, 1.0F));
     }
-    print_text(painter, rng, centre - half, 2 * half, rng.uniform(0.004F, 0.011F), any_colour(rng, 0.8F, 0.05F, 0.3F));
+    const Colour ink = any_colour(rng, 0.8F, 0.05F, 0.3F);
+    print_text(painter, rng, centre - half, 2 * half, rng.uniform(0.004F, 0.011F), ink);
   }
   scatter(painter, rng, count_for(painter, 25.0F), 0.015F, 0.08F, 0.85F, 0.8F);
   return std::move(painter).finish();
@@ -290,7 +212,8 @@ MipTexture paint_covers(float width_m, float height_m, std::uint32_t seed) {
       const Colour ink = any_colour(rng, 0.6F, 0.0F, 0.25F);
       const Colour print = cover.g + cover.r > 220 ? ink : from_hue(0.14F, 0.25F, 0.95F);
       painter.rectangle({x + width / 2, y + height / 2}, {width / 2, height / 2}, 0, cover);
-      painter.rectangle({x + width / 2, y + rng.uniform(0.03F, 0.08F)}, {width / 2, rng.uniform(0.004F, 0.012F)}, 0, print);
+      const float half_band = rng.uniform(0.004F, 0.012F);
+      painter.rectangle({x + width / 2, y + rng.uniform(0.03F, 0.08F)}, {width / 2, half_band}, 0, print);
       print_text(painter, rng, {x + 0.006F, y + 0.08F}, {width - 0.012F, height - 0.14F}, rng.uniform(0.0035F, 0.007F), print);
       any_shape(painter, rng, {x + width / 2, y + height - 0.04F}, 0.03F, any_colour(rng, 0.9F, 0.1F, 1.0F), 1.0F);
       y += height;
@@ -328,8 +251,10 @@ MipTexture paint_screen(float width_m, float height_m, std::uint32_t seed) {
   TexturePainter painter(width_m, height_m, 0.002F);
   painter.fill(from_hue(rng.uniform(0.5F, 0.7F), 0.6F, 0.35F));
   for (int i = 0; i < 4; ++i) {
-    const Eigen::Vector2f half(rng.uniform(0.15F, 0.3F) * width_m, rng.uniform(0.15F, 0.3F) * height_m);
-    const Eigen::Vector2f centre(rng.uniform(half.x(), width_m - half.x()), rng.uniform(half.y(), height_m - half.y()));
+    const float half_height = rng.uniform(0.15F, 0.3F) * height_m;
+    const Eigen::Vector2f half(rng.uniform(0.15F, 0.3F) * width_m, half_height);
+    const float y = rng.uniform(half.y(), height_m - half.y());
+    const Eigen::Vector2f centre(rng.uniform(half.x(), width_m - half.x()), y);
     const bool dark = rng.index(2) == 0;
     painter.rectangle(centre, half, 0, dark ? Colour{40, 36, 34} : Colour{235, 238, 238});
     painter.rectangle(centre - Eigen::Vector2f(0, half.y()), {half.x(), 0.008F}, 0, any_colour(rng, 0.9F, 0.5F, 0.9F));
@@ -360,7 +285,9 @@ MipTexture paint_shirt(float width_m, float height_m, std::uint32_t seed) {
 MipTexture paint_trousers(float width_m, float height_m, std::uint32_t seed) {
   HashRng rng(seed);
   TexturePainter painter(width_m, height_m, 0.004F);
-  painter.fill(from_hue(rng.uniform(0.55F, 0.72F), rng.uniform(0.1F, 0.5F), rng.uniform(0.25F, 0.5F)));
+  const float brightness = rng.uniform(0.25F, 0.5F);
+  const float saturation = rng.uniform(0.1F, 0.5F);
+  painter.fill(from_hue(rng.uniform(0.55F, 0.72F), saturation, brightness));
   painter.mottle(rng.next(), 0.06F, 0.15F, 0.35F, 4);
   return std::move(painter).finish();
 }
@@ -386,7 +313,8 @@ MipTexture paint_head(float width_m, float height_m, std::uint32_t seed) {
 
 MipTexture paint_skin(float width_m, float height_m, std::uint32_t seed) {
   HashRng rng(seed);
-  return plain(width_m, height_m, from_hue(0.06F, 0.45F, rng.uniform(0.5F, 0.9F)), rng.next(), 0.08F, 0.12F);
+  const std::uint32_t mottle_seed = rng.next();
+  return plain(width_m, height_m, from_hue(0.06F, 0.45F, rng.uniform(0.5F, 0.9F)), mottle_seed, 0.08F, 0.12F);
 }
 
 MipTexture paint_hair(float width_m, float height_m, std::uint32_t seed) {

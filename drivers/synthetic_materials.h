@@ -7,7 +7,7 @@
 
 #include "drivers/synthetic_texture.h"
 
-/// The synthetic room's surfaces, painted from integer hashes: rich in corners of every size that a camera resolves at 0.6 to 5 m,
+/// The synthetic worlds' surfaces, painted from integer hashes: rich in corners of every size that a camera resolves at 0.6 to 5 m,
 /// and nowhere repeating, so that every place looks like itself alone. Equal arguments paint equal textures. All reentrant.
 namespace posed {
 
@@ -27,6 +27,9 @@ struct FloorShadow {
 /// Carpet of irregular tiles with a patterned rug in the middle.
 MipTexture paint_floor(float width_m, float height_m, std::span<const FloorShadow> shadows, std::uint32_t seed);
 
+/// Speckled vinyl in large sheets, scuffed by shoes: the floor of a corridor or an office.
+MipTexture paint_vinyl_floor(float width_m, float height_m, std::span<const FloorShadow> shadows, std::uint32_t seed);
+
 MipTexture paint_ceiling(float width_m, float height_m, std::uint32_t seed);
 
 /// Cardboard or book covers with labels and print: faces of boxes take windows of it.
@@ -38,6 +41,12 @@ MipTexture paint_upholstery(float width_m, float height_m, std::uint32_t seed);
 
 /// A screen that shows windows and text.
 MipTexture paint_screen(float width_m, float height_m, std::uint32_t seed);
+
+/// A door leaf with panels, a name plate, a handle and a note or two.
+MipTexture paint_door(float width_m, float height_m, std::uint32_t seed);
+
+/// Cork with pages pinned to it.
+MipTexture paint_notice_board(float width_m, float height_m, std::uint32_t seed);
 
 /// What people wear and are; u goes once around the limb with the front at the middle, v along it.
 MipTexture paint_shirt(float width_m, float height_m, std::uint32_t seed);

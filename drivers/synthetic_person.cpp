@@ -96,7 +96,7 @@ struct SyntheticPerson::Posture {
   double elbow[2] = {0.3, 0.3};
 };
 
-SyntheticPerson SyntheticPerson::walking(std::uint32_t seed, int index, const SyntheticTrajectory& camera, PersonLook look) {
+SyntheticPerson SyntheticPerson::walking(std::uint32_t seed, int index, const SweepTrajectory& camera, PersonLook look) {
   HashRng rng(seed);
   SyntheticPerson person;
   person.mode_ = SyntheticMode::Walking;
@@ -130,7 +130,7 @@ SyntheticPerson SyntheticPerson::sitting(std::uint32_t seed, const Seat& seat, P
 }
 
 SyntheticPerson::Placement SyntheticPerson::walk_at(double t_s) const {
-  const double sweep = kTurn / SyntheticTrajectory::kPeriod_s;
+  const double sweep = kTurn / SweepTrajectory::kPeriod_s;
   const double rate = walk_.rounds * sweep;
   const double phase = rate * t_s + walk_.phase_rad;
   const double bearing = walk_.bearing_rad + sweep * t_s + walk_.half_arc_rad * std::sin(phase);
@@ -146,7 +146,7 @@ SyntheticPerson::Placement SyntheticPerson::walk_at(double t_s) const {
 }
 
 void SyntheticPerson::tabulate_strides() {
-  constexpr double kStep_s = SyntheticTrajectory::kPeriod_s / kStrideSamples;
+  constexpr double kStep_s = SweepTrajectory::kPeriod_s / kStrideSamples;
   stride_phase_.assign(kStrideSamples + 1, 0.0);
   for (std::size_t i = 1; i < stride_phase_.size(); ++i) {
     stride_phase_[i] = stride_phase_[i - 1] + walk_at((static_cast<double>(i) - 0.5) * kStep_s).speed_m_s * kStep_s;
@@ -160,8 +160,8 @@ void SyntheticPerson::tabulate_strides() {
 }
 
 SyntheticPerson::Posture SyntheticPerson::walking_posture(double t_s) const {
-  const double t = std::fmod(t_s, SyntheticTrajectory::kPeriod_s);
-  const double sample = t / SyntheticTrajectory::kPeriod_s * kStrideSamples;
+  const double t = std::fmod(t_s, SweepTrajectory::kPeriod_s);
+  const double sample = t / SweepTrajectory::kPeriod_s * kStrideSamples;
   const auto index = std::min(static_cast<std::size_t>(sample), static_cast<std::size_t>(kStrideSamples - 1));
   const double weight = sample - static_cast<double>(index);
   const double gait = stride_phase_[index] + weight * (stride_phase_[index + 1] - stride_phase_[index]);

@@ -45,7 +45,7 @@ class SyntheticPerson {
   static constexpr int kParts = 17;
 
   /// The `index`-th of the room's people, walking.
-  static SyntheticPerson walking(std::uint32_t seed, int index, const SyntheticTrajectory& camera, PersonLook look);
+  static SyntheticPerson walking(std::uint32_t seed, int index, const SweepTrajectory& camera, PersonLook look);
   static SyntheticPerson sitting(std::uint32_t seed, const Seat& seat, PersonLook look);
 
   /// Appends the body's parts at `t_s` to `parts`.

@@ -20,7 +20,7 @@ class SyntheticRenderer {
   SyntheticRenderer(const SyntheticWorld& world, const CameraIntrinsics& camera);
 
   /// Views the world of time `t_s` from `T_world_camera`. All views have the camera's size.
-  /// `depth_m`: along z, never 0 inside the room. `person_mask`: 255 on people, 0 elsewhere; may be empty.
+  /// `depth_m`: along z, never 0 inside the walls. `person_mask`: 255 on people, 0 elsewhere; may be empty.
   void render(double t_s, const Se3& T_world_camera, ImageView<PackedBgr> colour, ImageView<float> depth_m,
               ImageView<std::uint8_t> person_mask);
 

@@ -19,7 +19,7 @@ struct TexturedQuad {
   float length_v_m = 0;
   Eigen::Vector2f window_m{0, 0};  ///< where `corner` lies on the texture
   std::uint32_t texture = 0;
-  float brightness = 1;  ///< diffuse shading under the room's fixed light
+  float brightness = 1;  ///< diffuse shading under the world's fixed light
 
   Eigen::Vector3f normal() const { return axis_v.cross(axis_u); }
 };
@@ -37,27 +37,28 @@ struct Seat {
   float yaw_rad = 0;
 };
 
-/// What never moves: the room's shell, furniture, pictures. Built from a seed once; immutable then, so thread-safe.
+/// The space inside the outermost walls: x and y from minus to plus the half lengths, z from 0 to the height.
+struct Shell {
+  Eigen::Vector2f half_m{0, 0};
+  float height_m = 0;
+};
+
+/// What never moves: shell, inner walls, furniture, pictures. Built from a seed once; immutable then, so thread-safe.
 struct SyntheticScene {
-  static constexpr float kHalfLength_m = 3.1F;  ///< x from -this to this
-  static constexpr float kHalfWidth_m = 2.6F;   ///< y
-  static constexpr float kHeight_m = 2.7F;      ///< z from 0
   static constexpr float kSeatHeight_m = 0.45F;
   static constexpr int kMaxSeats = 8;
 
+  Shell shell;
   std::vector<MipTexture> textures;
   std::vector<TexturedQuad> quads;
   std::vector<SolidBox> solids;
   std::vector<Seat> seats;
 
-  /// Distance from a point inside the room to the nearest surface that does not move [m]; negative inside furniture.
+  /// Distance from a point inside the shell to the nearest surface that does not move [m]; negative inside walls and furniture.
   float clearance(const Eigen::Vector3f& p_world) const;
 };
 
-/// Diffuse shading, 0.4 to 1, of a surface with this unit normal under the room's light (half-Lambert, so that no side is black).
+/// Diffuse shading, 0.4 to 1, of a surface with this unit normal under the world's light (half-Lambert, so that no side is black).
 float diffuse_brightness(const Eigen::Vector3f& normal_world);
-
-/// `seats` chairs (at most kMaxSeats) stand free in the room, the first ones towards `heading_rad`; the middle stays empty.
-SyntheticScene build_synthetic_scene(std::uint32_t seed, int seats, float heading_rad);
 
 }  // namespace posed

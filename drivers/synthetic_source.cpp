@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -21,13 +22,14 @@ class SyntheticSource final : public RgbdSource {
       : camera_(std::move(camera)), pacing_(config.pacing), clock_(clock) {
     const CameraIntrinsics& k = camera_->intrinsics();
     const char* doing = config.synthetic.mode == SyntheticMode::Sitting ? "sitting" : "walking";
-    info_ = {
-        .description = fmt::format("synthetic room, {} people {}, seed {}", config.synthetic.people, doing, config.synthetic.seed),
-        .width = k.width,
-        .height = k.height,
-        .rate_hz = config.synthetic.rate_hz,
-        .total_frames = camera_->total_frames(),
-        .slots_held = pacing_ == Pacing::Realtime ? std::size_t{1} : std::size_t{0}};
+    const std::string_view world = world_name(config.synthetic.world);
+    info_ = {.description =
+                 fmt::format("synthetic {}, {} people {}, seed {}", world, config.synthetic.people, doing, config.synthetic.seed),
+             .width = k.width,
+             .height = k.height,
+             .rate_hz = config.synthetic.rate_hz,
+             .total_frames = camera_->total_frames(),
+             .slots_held = pacing_ == Pacing::Realtime ? std::size_t{1} : std::size_t{0}};
   }
 
   const SourceInfo& info() const override { return info_; }

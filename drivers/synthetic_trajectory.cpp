@@ -23,7 +23,28 @@ double ramped(double t_s) {
 
 }  // namespace
 
-SyntheticTrajectory::SyntheticTrajectory(std::uint32_t seed) {
+double SyntheticTrajectory::sum(const Harmonics& harmonics, double angle_rad) {
+  double value = 0;
+  for (const Harmonic& h : harmonics) {
+    value += h.amplitude * std::sin(h.multiple * angle_rad + h.phase_rad);
+  }
+  return value;
+}
+
+double SyntheticTrajectory::progress(double t_s) const {
+  return std::fmod(ramped(t_s) / period_s(), 1.0);
+}
+
+Se3 SyntheticTrajectory::camera_pose(double yaw_rad, double pitch_rad, double roll_rad, const Eigen::Vector3d& p_world) {
+  // Body axes (x forward, y left, z up) to the optical ones (z forward, x right, y down).
+  const Eigen::Quaterniond R_body_camera(Eigen::Matrix3d{{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}});
+  const Eigen::Quaterniond R_world_body = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) *
+                                          Eigen::AngleAxisd(-pitch_rad, Eigen::Vector3d::UnitY()) *
+                                          Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitX());
+  return Se3(R_world_body * R_body_camera, p_world);
+}
+
+SweepTrajectory::SweepTrajectory(std::uint32_t seed) {
   HashRng rng(hash32(seed, 0xca3e7aU));
   const auto phase = [&rng] { return kTurn * static_cast<double>(rng.uniform()); };
   start_heading_rad_ = phase();
@@ -35,28 +56,11 @@ SyntheticTrajectory::SyntheticTrajectory(std::uint32_t seed) {
   roll_ = {{{0.035, 6, phase()}, {0.015, 19, phase()}, {0.004, 33, phase()}}};
 }
 
-double SyntheticTrajectory::sum(const Harmonics& harmonics, double angle_rad) {
-  double value = 0;
-  for (const Harmonic& h : harmonics) {
-    value += h.amplitude * std::sin(h.multiple * angle_rad + h.phase_rad);
-  }
-  return value;
-}
-
-double SyntheticTrajectory::sweep_heading_rad(double t_s) const {
-  return start_heading_rad_ + kTurn * std::fmod(ramped(t_s) / kPeriod_s, 1.0);
-}
-
-Se3 SyntheticTrajectory::pose(double t_s) const {
-  const double angle = kTurn * std::fmod(ramped(t_s) / kPeriod_s, 1.0);
+Se3 SweepTrajectory::pose(double t_s) const {
+  const double angle = kTurn * progress(t_s);
   const double yaw = start_heading_rad_ + angle + sum(yaw_, angle);
   const double pitch = kPitch_rad + sum(pitch_, angle);
-  // Body axes (x forward, y left, z up) to the optical ones (z forward, x right, y down).
-  const Eigen::Quaterniond R_body_camera(Eigen::Matrix3d{{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}});
-  const Eigen::Quaterniond R_world_body = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
-                                          Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) *
-                                          Eigen::AngleAxisd(sum(roll_, angle), Eigen::Vector3d::UnitX());
-  return Se3(R_world_body * R_body_camera, {sum(x_, angle), sum(y_, angle), kHeight_m + sum(z_, angle)});
+  return camera_pose(yaw, pitch, sum(roll_, angle), {sum(x_, angle), sum(y_, angle), kHeight_m + sum(z_, angle)});
 }
 
 }  // namespace posed

@@ -1,9 +1,12 @@
 #include "drivers/synthetic_world.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "drivers/synthetic_hash.h"
 #include "drivers/synthetic_materials.h"
+#include "drivers/synthetic_places.h"
+#include "drivers/synthetic_walk.h"
 
 namespace posed {
 
@@ -25,17 +28,43 @@ int chairs_for(const SyntheticConfig& config) {
 
 }  // namespace
 
-SyntheticWorld::SyntheticWorld(const SyntheticConfig& config)
-    : trajectory_(fold_seed(config.seed)),
-      scene_(
-          build_synthetic_scene(fold_seed(config.seed), chairs_for(config), static_cast<float>(trajectory_.start_heading_rad()))) {
+std::string_view world_name(SyntheticWorldKind kind) {
+  switch (kind) {
+    case SyntheticWorldKind::Room: return "room";
+    case SyntheticWorldKind::Corridor: return "corridor";
+    case SyntheticWorldKind::Office: return "office";
+    case SyntheticWorldKind::TwinRooms: return "twin_rooms";
+  }
+  return "unknown";
+}
+
+SyntheticWorld::SyntheticWorld(const SyntheticConfig& config) {
+  if (config.world == SyntheticWorldKind::Room) {
+    enter_room(config);
+  } else {
+    walk_through(config.world, fold_seed(config.seed));
+  }
+}
+
+void SyntheticWorld::enter_room(const SyntheticConfig& config) {
+  auto sweep = std::make_unique<SweepTrajectory>(fold_seed(config.seed));
+  scene_ = build_room(fold_seed(config.seed), chairs_for(config), static_cast<float>(sweep->start_heading_rad()));
   for (int i = 0; i < people_of(config); ++i) {
     const std::uint32_t seed = hash32(fold_seed(config.seed), 0x9e09e1U, static_cast<std::uint32_t>(i));
     const PersonLook look = dress(seed);
     people_.push_back(config.mode == SyntheticMode::Walking
-                          ? SyntheticPerson::walking(seed, i, trajectory_, look)
+                          ? SyntheticPerson::walking(seed, i, *sweep, look)
                           : SyntheticPerson::sitting(seed, scene_.seats[static_cast<std::size_t>(i)], look));
   }
+  trajectory_ = std::move(sweep);
+}
+
+void SyntheticWorld::walk_through(SyntheticWorldKind kind, std::uint32_t seed) {
+  WalkedPlace place = kind == SyntheticWorldKind::Corridor ? build_corridor(seed)
+                      : kind == SyntheticWorldKind::Office ? build_office(seed)
+                                                           : build_twin_rooms(seed);
+  scene_ = std::move(place.scene);
+  trajectory_ = std::make_unique<WalkTrajectory>(std::move(place.path), seed);
 }
 
 PersonLook SyntheticWorld::dress(std::uint32_t seed) {

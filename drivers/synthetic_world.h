@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <string_view>
 #include <vector>
 
 #include "config/config.h"
@@ -10,27 +12,34 @@
 
 namespace posed {
 
-/// The synthetic world: a furnished room, its people, and the path of the camera in it, everything a function of the configuration
-/// and of time. World frame: metres, z up, origin in the middle of the floor. Immutable, so thread-safe.
+/// The name of a world in the configuration. Reentrant.
+std::string_view world_name(SyntheticWorldKind kind);
+
+/// The synthetic world: a furnished place, the people in it, and the way of the camera through it, everything a function of the
+/// configuration and of time. World frame: metres, z up, origin in the middle of the floor. Immutable, so thread-safe.
 class SyntheticWorld {
  public:
   static constexpr int kMaxPeople = SyntheticScene::kMaxSeats;
 
-  /// `config.people` is clamped to 0..kMaxPeople; whoever reads a user's value checks it first.
+  /// `config.people` is clamped to 0..kMaxPeople, and only the room has people; whoever reads a user's values checks them first.
+  /// Paints the place: tenths of a second.
   explicit SyntheticWorld(const SyntheticConfig& config);
 
   const SyntheticScene& scene() const { return scene_; }
+  const SyntheticTrajectory& trajectory() const { return *trajectory_; }
 
   /// T_world_camera at `t_s` >= 0.
-  Se3 camera_pose(double t_s) const { return trajectory_.pose(t_s); }
+  Se3 camera_pose(double t_s) const { return trajectory_->pose(t_s); }
 
   /// Replaces `parts` by the bodies of all people at `t_s`; does not allocate once `parts` has had its size.
   void body_parts(double t_s, std::vector<BodyPart>& parts) const;
 
  private:
+  void enter_room(const SyntheticConfig& config);
+  void walk_through(SyntheticWorldKind kind, std::uint32_t seed);
   PersonLook dress(std::uint32_t seed);
 
-  SyntheticTrajectory trajectory_;
+  std::unique_ptr<const SyntheticTrajectory> trajectory_;
   SyntheticScene scene_;
   std::vector<SyntheticPerson> people_;
 };

@@ -45,19 +45,34 @@ int FeatureFrame::row_of(float v) const {
 }
 
 void FeatureFrame::place(const PinholeCamera& camera, ImageView<const float> depth_m) {
+  ideal_pixels_.resize(size());
+  depth_m_.resize(size());
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Keypoint& k = features_.keypoints[i];
+    ideal_pixels_[i] = camera.undistort({k.x, k.y}).cast<float>();
+    depth_m_[i] = depth_at(depth_m, k.x, k.y);
+  }
+  complete(camera);
+}
+
+void FeatureFrame::place_stored(const PinholeCamera& camera, const Features& features,
+                                const std::vector<Eigen::Vector2f>& ideal_pixels, const std::vector<float>& depth_m) {
+  assert(ideal_pixels.size() == features.keypoints.size() && depth_m.size() == features.keypoints.size());
+  features_ = features;
+  ideal_pixels_ = ideal_pixels;
+  depth_m_ = depth_m;
+  complete(camera);
+}
+
+void FeatureFrame::complete(const PinholeCamera& camera) {
   const std::size_t n = size();
   assert(n <= std::numeric_limits<std::uint16_t>::max());
-  ideal_pixels_.resize(n);
-  depth_m_.resize(n);
   disparity_.resize(n);
   cell_of_.resize(n);
   cell_keypoints_.resize(n);
   std::fill(cell_begin_.begin(), cell_begin_.end(), std::uint16_t{0});
   const auto baseline_fx = static_cast<float>(camera.intrinsics().baseline_fx);
   for (std::size_t i = 0; i < n; ++i) {
-    const Keypoint& k = features_.keypoints[i];
-    ideal_pixels_[i] = camera.undistort({k.x, k.y}).cast<float>();
-    depth_m_[i] = depth_at(depth_m, k.x, k.y);
     disparity_[i] = depth_m_[i] > 0 ? baseline_fx / depth_m_[i] : 0.0F;
     cell_of_[i] = static_cast<std::uint16_t>(row_of(ideal_pixels_[i].y()) * kColumns + column_of(ideal_pixels_[i].x()));
     ++cell_begin_[cell_of_[i] + 1];

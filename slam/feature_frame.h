@@ -23,6 +23,10 @@ class FeatureFrame {
   /// Completes `features()` after the extractor has filled them: undistorts, looks depths up, sorts into the grid.
   void place(const PinholeCamera& camera, ImageView<const float> depth_m);
 
+  /// Becomes a frame that was placed before: the features, ideal pixels and depths of a stored keyframe, of equal length.
+  void place_stored(const PinholeCamera& camera, const Features& features, const std::vector<Eigen::Vector2f>& ideal_pixels,
+                    const std::vector<float>& depth_m);
+
   Features& features() { return features_; }
   const Features& features() const { return features_; }
   std::size_t size() const { return features_.keypoints.size(); }
@@ -44,6 +48,7 @@ class FeatureFrame {
   static constexpr int kRows = 36;
   int column_of(float u) const;
   int row_of(float v) const;
+  void complete(const PinholeCamera& camera);  // disparities and the grid, out of pixels and depths
 
   float min_u_, min_v_, max_u_, max_v_;  // bounds of the undistorted image
   float columns_per_pixel_, rows_per_pixel_;

@@ -16,14 +16,22 @@ using KeyframeId = std::uint64_t;
 constexpr LandmarkId kNoLandmark = 0;  ///< identifiers start at 1
 constexpr KeyframeId kNoKeyframe = 0;
 
+/// What the tracker asks of the mapper with a record.
+enum class RecordPurpose : std::uint8_t {
+  Keyframe,        ///< take it into the map
+  Relocalization,  ///< find where it was taken; it has neither id nor pose
+};
+
 /// A frame as the tracker hands it to the mapper: its features, where they lie in space, and which landmarks they were matched to.
 /// Index i of every vector is one keypoint. The vectors keep their capacity when a record is reused.
 struct KeyframeRecord {
+  RecordPurpose purpose = RecordPurpose::Keyframe;
   KeyframeId id = kNoKeyframe;  ///< given by the tracker, counting from 1
   std::uint64_t sequence = 0;   ///< of the frame
   TimeNs capture_ns = 0;
   Se3 T_map_camera;
-  Matrix6d covariance = Matrix6d::Zero();  ///< as in PoseEstimate
+  Se3 T_map_odom;                          ///< that T_map_camera rests on: the mapper may have corrected the map since
+  Matrix6d covariance = Matrix6d::Zero();  ///< of T_map_camera, given the landmarks it was tracked against
   bool starts_map = false;                 ///< first keyframe of a new map: what came before is unrelated to it
   std::uint32_t map_id = 0;
 

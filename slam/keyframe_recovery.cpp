@@ -5,6 +5,7 @@
 
 #include "core/rigid_alignment.h"
 #include "slam/hamming.h"
+#include "slam/p3p.h"
 
 namespace posed {
 
@@ -15,6 +16,9 @@ constexpr double kMaxRatio = 0.85;
 constexpr int kRansacRounds = 100;
 constexpr double kAgreementBase = 0.03;  // [m] how far matched points may lie apart, plus a share of the depth squared
 constexpr double kAgreementGrowth = 0.02;
+constexpr double kChi2Seen = 9.21;  // 99 % quantile of the chi-squared distribution with 2 degrees of freedom
+
+using Sample = std::array<std::size_t, 3>;
 
 /// Splitmix64 (Steele, Lea, Flood, OOPSLA 2014): enough for picking samples, and the same everywhere.
 struct SampleStream {
@@ -26,7 +30,19 @@ struct SampleStream {
     z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
     return static_cast<std::size_t>((z ^ (z >> 31)) % n);
   }
+  /// Three different indices; nothing where two of those drawn are the same.
+  std::optional<Sample> three_below(std::size_t n) {
+    if (n < 3) {
+      return std::nullopt;
+    }
+    const Sample s = {below(n), below(n), below(n)};
+    return s[0] == s[1] || s[0] == s[2] || s[1] == s[2] ? std::nullopt : std::optional(s);
+  }
 };
+
+std::array<Eigen::Vector3d, 3> pick(const std::vector<Eigen::Vector3d>& points, const Sample& sample) {
+  return {points[sample[0]], points[sample[1]], points[sample[2]]};
+}
 
 }  // namespace
 
@@ -81,26 +97,62 @@ int KeyframeRecovery::count_agreeing(const Se3& T_map_camera) const {
   return agreeing;
 }
 
-std::optional<Se3> KeyframeRecovery::ransac() {
-  const std::size_t n = p_map_.size();
-  if (n < 3) {
-    return std::nullopt;
+int KeyframeRecovery::count_seen(const Se3& T_map_camera) const {
+  const Se3 T_camera_map = T_map_camera.inverse();
+  const Eigen::Matrix3d R_camera_map = T_camera_map.rotation_matrix();
+  int seen = 0;
+  for (const PoseObservation& o : observations_) {
+    const Eigen::Vector3d p_camera = R_camera_map * o.p_map + T_camera_map.translation();
+    seen += p_camera.z() > 0 && o.pixel_weight * (camera_.project(p_camera) - o.ideal_pixel).squaredNorm() < kChi2Seen ? 1 : 0;
   }
-  SampleStream stream{n};
+  return seen;
+}
+
+std::optional<Se3> KeyframeRecovery::align_with_depth() const {
+  SampleStream stream{p_map_.size()};
   int most = 0;
   std::optional<Se3> best;
   for (int round = 0; round < kRansacRounds; ++round) {
-    const std::array<std::size_t, 3> sample = {stream.below(n), stream.below(n), stream.below(n)};
-    if (sample[0] == sample[1] || sample[0] == sample[2] || sample[1] == sample[2]) {
+    const std::optional<Sample> sample = stream.three_below(p_map_.size());
+    if (!sample) {
       continue;
     }
-    const std::array<Eigen::Vector3d, 3> a = {p_map_[sample[0]], p_map_[sample[1]], p_map_[sample[2]]};
-    const std::array<Eigen::Vector3d, 3> b = {p_camera_[sample[0]], p_camera_[sample[1]], p_camera_[sample[2]]};
+    const std::array<Eigen::Vector3d, 3> a = pick(p_map_, *sample);
+    const std::array<Eigen::Vector3d, 3> b = pick(p_camera_, *sample);
     const Se3 T_map_camera = align_points(a, b);
     const int agreeing = count_agreeing(T_map_camera);
     if (agreeing > most) {
       most = agreeing;
       best = T_map_camera;
+    }
+  }
+  return best;
+}
+
+std::optional<Se3> KeyframeRecovery::align_rays() const {
+  SampleStream stream{observations_.size()};
+  int most = 0;
+  std::optional<Se3> best;
+  for (int round = 0; round < kRansacRounds; ++round) {
+    const std::optional<Sample> sample = stream.three_below(observations_.size());
+    if (!sample) {
+      continue;
+    }
+    std::array<Eigen::Vector3d, 3> p_map;
+    std::array<Eigen::Vector3d, 3> rays;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const PoseObservation& o = observations_[(*sample)[i]];
+      p_map[i] = o.p_map;
+      rays[i] = camera_.unproject(o.ideal_pixel, 1.0).normalized();
+    }
+    const P3pSolutions solutions = solve_p3p(p_map, rays);
+    for (int s = 0; s < solutions.count; ++s) {
+      const Se3& T_map_camera = solutions.T_map_camera[static_cast<std::size_t>(s)];
+      const int seen = count_seen(T_map_camera);
+      if (seen > most) {
+        most = seen;
+        best = T_map_camera;
+      }
     }
   }
   return best;
@@ -130,7 +182,8 @@ std::optional<KeyframeRecovery::Recovered> KeyframeRecovery::recover(const MapSn
     observations_.push_back({p_map, pixel, frame.disparity()[m.keypoint], noise_.pixel_weight(level),
                              z > 0 ? noise_.disparity_weight(level, z) : 0.0, true});
   }
-  const std::optional<Se3> initial = ransac();
+  // Poses out of points with depth need no other view of them, so they come first where they can.
+  const std::optional<Se3> initial = 2 * p_map_.size() >= matches_.size() ? align_with_depth() : align_rays();
   if (!initial) {
     return std::nullopt;
   }

@@ -14,8 +14,9 @@
 namespace posed {
 
 /// Finds the camera again, without a prediction, by matching a frame against one recent keyframe: nearest descriptors both ways,
-/// then three-point 3D-3D RANSAC over the keypoints with depth, then the robust pose solver. Deterministic: the random numbers
-/// depend on the frame's content alone. Does not allocate once warm. Reentrant: one object a thread.
+/// then RANSAC with samples of three: 3D-3D over the keypoints with depth or, where most matches have none, P3P over all of them;
+/// then the robust pose solver. Deterministic: the random numbers depend on the frame's content alone. Does not allocate once warm.
+/// Reentrant: one object a thread.
 class KeyframeRecovery {
  public:
   KeyframeRecovery(const PinholeCamera& camera, const TrackerConfig& config);
@@ -35,8 +36,10 @@ class KeyframeRecovery {
     std::uint16_t distance;
   };
   void match_descriptors(const MapSnapshot& map, const SnapshotKeyframe& keyframe, const FeatureFrame& frame);
-  std::optional<Se3> ransac();
+  std::optional<Se3> align_with_depth() const;
+  std::optional<Se3> align_rays() const;
   int count_agreeing(const Se3& T_map_camera) const;
+  int count_seen(const Se3& T_map_camera) const;
 
   PinholeCamera camera_;
   MeasurementNoise noise_;

@@ -1,37 +1,60 @@
 #pragma once
 
-#include <memory>
-#include <optional>
+#include <cstddef>
+#include <vector>
 
 #include "config/config.h"
+#include "slam/interrupt.h"
 #include "slam/keyframe_record.h"
-#include "slam/map_snapshot.h"
+#include "slam/landmark_estimator.h"
+#include "slam/landmark_fusion.h"
+#include "slam/landmark_triangulation.h"
+#include "slam/map.h"
+#include "slam/map_adjuster.h"
 
 namespace posed {
 
-/// Owns the map: takes keyframes in, makes and maintains landmarks, and writes snapshots for the tracker. Thread-bound: everything
-/// is called by one thread, the mapper's (in lockstep, the only one).
+/// What happens to the map around a new keyframe: landmarks are measured again, judged, made and joined; the neighbourhood is
+/// adjusted; keyframes that tell nothing new go. Thread-bound to the mapper.
 class LocalMapper {
  public:
-  LocalMapper(const TrackerConfig& tracker, const MapperConfig& config, const CameraIntrinsics& camera);
-  ~LocalMapper();
+  /// Everything passed in must outlive it.
+  LocalMapper(const TrackerConfig& tracker, const MapperConfig& config, const LandmarkEstimator& estimator, Map& map);
 
-  /// Takes a keyframe in. `record` is the caller's again on return.
+  /// Takes a keyframe in at `record.T_map_camera`: links its matches, which move their landmarks; removes landmarks that keyframes
+  /// keep missing; makes landmarks of its depths. Short: the tracker waits for its outcome.
   void insert(const KeyframeRecord& record);
 
-  /// Overwrites `snapshot` with the present local map; its vectors keep their capacity.
-  void write_snapshot(MapSnapshot& snapshot) const;
+  /// Looks at the neighbours of a keyframe: triangulates what has no trusted depth, joins landmarks that are the same point.
+  /// Gives up between two neighbours where interrupted.
+  void extend(KeyframeId keyframe, const Interrupt& interrupt);
 
-  /// Present pose of a keyframe, for the final trajectory; kept also for keyframes that the map has dropped (then relative to a
-  /// keyframe that it kept). Nothing for an unknown id.
-  std::optional<Se3> keyframe_pose(KeyframeId id) const;
+  /// Bundle adjustment of the keyframe's neighbourhood.
+  BundleSummary adjust(KeyframeId keyframe, const Interrupt& interrupt);
 
-  std::size_t keyframe_count() const;
-  std::size_t landmark_count() const;
+  /// Neighbours of `keyframe` nearly all of whose landmarks at least three other keyframes see at least as well (Mur-Artal,
+  /// Montiel, Tardos, "ORB-SLAM", T-RO 2015, section VI-E); never those of `kept`, nor a map's oldest.
+  std::vector<KeyframeId> redundant_keyframes(KeyframeId keyframe, std::size_t kept_newest) const;
+
+  /// Share of a keyframe's landmarks that at least three others see at least as well, 0 to 1.
+  double redundancy(const Keyframe& keyframe) const;
+
+  MapAdjuster& adjuster() { return adjuster_; }
+  LandmarkFusion& fusion() { return fusion_; }
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  void link_to_tree(const KeyframeRecord& record);
+  void extend_observed(const KeyframeRecord& record);
+  void judge_predicted(const KeyframeRecord& record);
+  void create_from_depth(const KeyframeRecord& record);
+
+  double close_depth_m_;
+  MapperConfig config_;
+  const LandmarkEstimator& estimator_;
+  Map& map_;
+  LandmarkTriangulation triangulation_;
+  LandmarkFusion fusion_;
+  MapAdjuster adjuster_;
 };
 
 }  // namespace posed

@@ -28,15 +28,31 @@ struct SnapshotKeyframe {
   std::vector<std::uint32_t> landmarks;  ///< indices into MapSnapshot::landmarks that this keyframe observes
 };
 
-/// The tracker's view of the map: the landmarks around the camera and the recent keyframes. Written by the mapper into a
+/// The mapper's answer to the tracker's last question where the camera is.
+struct RelocalizationAnswer {
+  std::uint64_t sequence = 0;  ///< of the frame that was asked about
+  bool answered = false;       ///< false: nothing was asked yet
+  bool found = false;          ///< then the snapshot shows the place that was found
+  Se3 T_map_camera;            ///< of that frame
+};
+
+/// The tracker's view of the map: the landmarks around the camera and the keyframes that see them. Written by the mapper into a
 /// `LatestValue`, immutable while the tracker reads it.
 struct MapSnapshot {
   std::uint64_t version = 0;  ///< counts up with each snapshot; 0: nothing mapped yet
   std::uint32_t map_id = 0;
+  std::uint32_t newest_map_id = 0;  ///< the largest that was ever given
+  /// The mapper moves it with the part of the map that the camera is in, so that T_odom_camera, and with it the prediction of the
+  /// next pose, stays continuous when the map is corrected.
   Se3 T_map_odom;
   KeyframeId newest_keyframe = kNoKeyframe;  ///< the last one the mapper has taken in
-  std::vector<SnapshotLandmark> landmarks;   ///< by ascending id
-  std::vector<SnapshotKeyframe> keyframes;   ///< newest first
+  /// The keyframe whose error bounds that of the landmarks here best, and its covariance against the map's origin, as in
+  /// PoseEstimate: the drift that a pose tracked against this snapshot inherits.
+  Se3 T_map_anchor;
+  Matrix6d anchor_covariance = Matrix6d::Zero();
+  RelocalizationAnswer relocalization;
+  std::vector<SnapshotLandmark> landmarks;  ///< by ascending id
+  std::vector<SnapshotKeyframe> keyframes;  ///< the one this is the surroundings of, then those nearest to it
 };
 
 }  // namespace posed

@@ -18,7 +18,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
   set(POSED_ORB_DEFINITIONS POSED_KERNELS_X86=1)
   posed_kernels(avx2 -mavx2 -mbmi -mpopcnt)
   # gcc 12 takes the undefined vectors inside its own AVX-512 headers for a mistake (GCC bug 105593).
-  posed_kernels(avx512 -Wno-uninitialized -Wno-maybe-uninitialized -mavx2 -mbmi -mpopcnt -mavx512f -mavx512bw -mavx512cd -mavx512dq -mavx512vl)
+  posed_kernels(avx512 -Wno-uninitialized $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized> -mavx2 -mbmi -mpopcnt -mavx512f -mavx512bw -mavx512cd -mavx512dq -mavx512vl)
   foreach(level avx2 avx512)
     list(APPEND POSED_ORB_KERNEL_OBJECTS $<TARGET_OBJECTS:posed_kernels_${level}>)
   endforeach()

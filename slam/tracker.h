@@ -15,12 +15,14 @@ namespace posed {
 /// with the same snapshots give the same bits. Thread-bound: one thread calls `track`.
 class Tracker {
  public:
-  /// `T_map_camera_start`: the camera's pose in the map frame when a map begins.
-  Tracker(const TrackerConfig& config, const MapperConfig& mapper, const CameraIntrinsics& camera, const Se3& T_map_camera_start);
+  /// `T_map_camera_start`: the camera's pose in the map frame when the first map begins. In `MapMode::Localization` none is begun.
+  Tracker(const TrackerConfig& config, const MapperConfig& mapper, MapMode mode, const CameraIntrinsics& camera,
+          const Se3& T_map_camera_start);
   ~Tracker();
 
-  /// The pose of `frame`. Where the frame should become a keyframe and `candidate` is not null, fills `*candidate` and says so in
-  /// `PoseEstimate::keyframe`; the caller then hands it to the mapper. A null `candidate` (the mapper is behind) only delays it.
+  /// The pose of `frame`. Where the frame should become a keyframe or, the camera being lost, the mapper should say where it is,
+  /// and `candidate` is not null, fills `*candidate` and says so in `PoseEstimate::keyframe` or `asks_where`; the caller then hands
+  /// it to the mapper. A null `candidate` (the mapper is behind) only delays it.
   PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate);
 
   /// Time spent in the parts of the last `track` [ns].

@@ -9,9 +9,9 @@
 #include <dlfcn.h>
 #include <execinfo.h>
 #include <iterator>
-#include <span>
 #include <poll.h>
 #include <pthread.h>
+#include <span>
 #include <time.h>
 #include <unistd.h>
 

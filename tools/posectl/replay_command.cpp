@@ -38,10 +38,13 @@ struct ReplayOptions {
   std::filesystem::path online_trajectory;
   std::filesystem::path stats;
   std::filesystem::path groundtruth;
+  std::filesystem::path map_in;
+  std::filesystem::path map_out;
+  bool localization_only = false;
   bool publish = false;
   bool quiet = false;
 
-  std::vector<std::filesystem::path> outputs() const { return {trajectory, online_trajectory, stats, groundtruth}; }
+  std::vector<std::filesystem::path> outputs() const { return {trajectory, online_trajectory, stats, groundtruth, map_out}; }
 };
 
 /// What the source complained of: the first few messages, and the last one, which tells why it failed. Thread-safe.
@@ -155,11 +158,22 @@ Status check_before_run(const ReplayOptions& options, const Config& config) {
   return {};
 }
 
+int exit_code_after(const ReplayStats& stats, const SourceErrors& source_errors) {
+  if (stats.health.source_failed) {
+    return exit_code_of(source_errors.last().code);
+  }
+  if (stats.health.map_save_errors > 0) {
+    return exit_code_of(ErrorCode::Io);  // the log has said why
+  }
+  return stats.health.frames_tracked > 0 ? kExitOk : kExitNegative;
+}
+
 int run_replay(const ReplayOptions& options, const Console& console) {
-  const Result<Config> config = make_replay_config(options.source);
+  Result<Config> config = make_replay_config(options.source);
   if (!config) {
     return report_error(console.err, config.error());
   }
+  config->map.mode = options.localization_only ? MapMode::Localization : MapMode::Mapping;
   if (const Status status = check_before_run(options, *config); !status) {
     return report_error(console.err, status.error());
   }
@@ -167,6 +181,7 @@ int run_replay(const ReplayOptions& options, const Console& console) {
   std::optional<EstimateRecorder> recorder;
   AppOptions app_options;
   app_options.publish = options.publish;
+  app_options.map_files = MapFiles{options.map_in.string(), false, options.map_out.string()};  // never the robot's own
   app_options.on_estimate = [&recorder](const PoseEstimate& estimate) { recorder->record(estimate); };
   app_options.on_source_error = [&source_errors](const Error& error) { source_errors.add(error); };
   const Result<std::unique_ptr<App>> app = App::create(*config, app_options, SystemClock::instance());
@@ -187,10 +202,7 @@ int run_replay(const ReplayOptions& options, const Console& console) {
     return report_error(console.err, written.error());
   }
   fmt::print(console.out, "{}", format_replay_summary(*stats));
-  if (stats->health.source_failed) {
-    return exit_code_of(source_errors.last().code);
-  }
-  return stats->health.frames_tracked > 0 ? kExitOk : kExitNegative;
+  return exit_code_after(*stats, source_errors);
 }
 
 void add_source_options(CLI::App& command, ReplaySource& source) {
@@ -237,6 +249,11 @@ void add_replay_command(CLI::App& parent, const Console& console, int& exit_code
   command->add_option("--stats", options->stats, "Write counters and latencies (JSON)");
   command->add_option("--groundtruth", options->groundtruth,
                       "Synthetic: write the true pose of every processed frame (TUM format)");
+  CLI::Option* map_in = command->add_option("--map-in", options->map_in, "Begin with this saved map");
+  CLI::Option* map_out = command->add_option("--map-out", options->map_out, "Save the map at the end");
+  command->add_flag("--localization-only", options->localization_only, "Use the map of --map-in without changing it")
+      ->needs(map_in)
+      ->excludes(map_out);
   command->add_flag("--publish", options->publish, "Publish over LCM, too");
   command->add_flag("--quiet", options->quiet, "No progress");
   command->callback([options, &console, &exit_code] { exit_code = run_replay(*options, console); });

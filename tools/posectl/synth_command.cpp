@@ -96,6 +96,12 @@ void add_synth_command(CLI::App& parent, const Console& console, int& exit_code)
   CLI::App* command = parent.add_subcommand(
       "synth", "Write the synthetic world as a recording in the TUM RGB-D layout, with ground truth and masks");
   command->add_option("--out", options->request.folder, "Folder to write to; it is made")->required();
+  const std::map<std::string, SyntheticWorldKind> worlds{{"room", SyntheticWorldKind::Room},
+                                                         {"corridor", SyntheticWorldKind::Corridor},
+                                                         {"office", SyntheticWorldKind::Office},
+                                                         {"twin_rooms", SyntheticWorldKind::TwinRooms}};
+  command->add_option("--world", world.world, "room, corridor, office or twin_rooms; room unless given. Only the room has people")
+      ->transform(CLI::CheckedTransformer(worlds));
   command->add_option("--seed", world.seed, "The world's seed")->capture_default_str();
   const std::map<std::string, SyntheticMode> modes{{"sitting", SyntheticMode::Sitting}, {"walking", SyntheticMode::Walking}};
   command->add_option("--mode", world.mode, "What people do, sitting or walking; walking unless given")

@@ -75,6 +75,11 @@ HealthReport from_status_message(const status_t& message) {
   health.transport_up = true;  // the message came
   health.map_keyframes = count_of(message.map_keyframes);
   health.map_landmarks = count_of(message.map_landmarks);
+  health.map_saves = count_of(message.map_saves);
+  health.map_save_errors = count_of(message.map_save_errors);
+  health.loops_closed = count_of(message.loops_closed);
+  health.maps_joined = count_of(message.maps_joined);
+  health.relocalizations = count_of(message.relocalizations);
   health.track = latency_of(message.track);
   health.latency = latency_of(message.latency);
   health.map = latency_of(message.map);

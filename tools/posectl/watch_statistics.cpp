@@ -45,7 +45,10 @@ std::string health_table(const HealthReport& health) {
   return fmt::format("frames     captured {}  tracked {}  lost {}  dropped {}  missed {}  no slot {}  skipped {}\n",
                      health.frames_captured, health.frames_tracked, health.frames_lost, health.frames_dropped, health.frames_missed,
                      health.frames_no_slot, health.frames_skipped) +
-         fmt::format("map        {} keyframes  {} landmarks\n", health.map_keyframes, health.map_landmarks) +
+         fmt::format(
+             "map        {} keyframes  {} landmarks  {} loops closed  {} joined  {} relocalised  saved {} times  errors {}\n",
+             health.map_keyframes, health.map_landmarks, health.loops_closed, health.maps_joined, health.relocalizations,
+             health.map_saves, health.map_save_errors) +
          fmt::format("poses      published {}  dropped {}  errors {}\n", health.poses_published, health.poses_dropped,
                      health.publish_errors) +
          fmt::format("tracker    p50 {:.2f}  p99 {:.2f}  max {:.2f} ms\n", health.track.p50_ms, health.track.p99_ms,

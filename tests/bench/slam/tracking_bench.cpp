@@ -3,7 +3,7 @@
 // features has.
 #include <benchmark/benchmark.h>
 
-#include "slam/local_mapper.h"
+#include "slam/mapper.h"
 #include "slam/measurement_noise.h"
 #include "slam/pose_solver.h"
 #include "slam/projection_matcher.h"
@@ -26,7 +26,7 @@ struct Scene {
   MapSnapshot map;
 
   Scene() {
-    LocalMapper mapper(config, MapperConfig{}, world.intrinsics);
+    Mapper mapper(config, MapperConfig{}, MapMode::Mapping, world.intrinsics);
     mapper.insert(FeatureWorld::record(world.view(Se3(), 0.7, 0.005), 1, {}));
     mapper.write_snapshot(map);
   }

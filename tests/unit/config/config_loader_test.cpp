@@ -216,8 +216,9 @@ TEST_F(ConfigLoader, UnknownKeysGetTheNearestKnownOne) {
             "posed.toml:2:1: tracker.max_keyframes: 20: unknown key; did you mean mapper.max_keyframes?");
   EXPECT_EQ(error_of("features = 20"), "posed.toml:1:1: features: 20: unknown key; did you mean tracker.features?");
   EXPECT_EQ(error_of("[mapper]\nspeed = \"high\""),
-            "posed.toml:2:1: mapper.speed: \"high\": unknown key; allowed here: max_keyframes, local_landmarks, local_keyframes, "
-            "recovery_keyframes");
+            "posed.toml:2:1: mapper.speed: \"high\": unknown key; allowed here: max_keyframes, max_landmarks, local_landmarks, "
+            "local_keyframes, recovery_keyframes, bundle_keyframes, bundle_iterations, bundle_budget_s, loop_closing, "
+            "loop_max_drift");
   EXPECT_EQ(error_of("quux = 1"), "posed.toml:1:1: quux: 1: unknown key; allowed are only keys in tables, such as [tracker]");
   EXPECT_EQ(
       error_of("[pipeline]\nqueues = 3"),
@@ -229,10 +230,10 @@ TEST_F(ConfigLoader, UnknownTablesAreReportedOnce) {
             "posed.toml:1:2: traker: unknown table; did you mean tracker?");
   EXPECT_EQ(error_of("[pipeline.captur]\npriority = 1"),
             "posed.toml:1:11: pipeline.captur: unknown table; did you mean pipeline.capture?");
-  EXPECT_EQ(
-      error_of("[quantum]\nspin.up = 1"),
-      "posed.toml:1:2: quantum: unknown table; allowed here: source, source.replay, source.synthetic, camera, tracker, mapper, "
-      "publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, pipeline.publisher, logging");
+  EXPECT_EQ(error_of("[quantum]\nspin.up = 1"),
+            "posed.toml:1:2: quantum: unknown table; allowed here: source, source.replay, source.synthetic, camera, tracker, "
+            "mapper, map, "
+            "publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, pipeline.publisher, logging");
 }
 
 TEST_F(ConfigLoader, DuplicatesAndSyntaxErrors) {
@@ -260,9 +261,16 @@ TEST_F(ConfigLoader, AllMistakesAreReportedInTheOrderOfTheText) {
 TEST_F(ConfigLoader, RulesBetweenKeys) {
   EXPECT_EQ(error_of("[source]\nkind = \"replay\""),
             "posed.toml:2:8: source.kind: \"replay\": needs source.replay.sequence, the folder of a recording");
+  EXPECT_EQ(
+      error_of("[source.synthetic]\nworld = \"office\""),
+      "posed.toml:2:9: source.synthetic.world: \"office\": only the world \"room\" has people: source.synthetic.people (2) must "
+      "be 0 here");
+  EXPECT_TRUE(parse_config("[source.synthetic]\nworld = \"office\"\npeople = 0", "posed.toml"));
   EXPECT_EQ(error_of("[tracker]\nfast_threshold_minimum = 21"),
             "posed.toml:2:26: tracker.fast_threshold_minimum: 21: tracker.fast_threshold_minimum (21) must be at most "
             "tracker.fast_threshold (20)");
+  EXPECT_EQ(error_of("[map]\nmode = \"localization\""),
+            "posed.toml:2:8: map.mode: \"localization\": needs map.file, the map to localize in");
   // The key that the text has is blamed.
   EXPECT_EQ(
       error_of("[tracker]\nfast_threshold = 6"),
@@ -272,8 +280,8 @@ TEST_F(ConfigLoader, RulesBetweenKeys) {
   EXPECT_EQ(error_of("[mapper]\nmax_keyframes = 15\nlocal_keyframes = 15"),
             "posed.toml:2:17: mapper.max_keyframes: 15: mapper.recovery_keyframes (20) must be at most mapper.max_keyframes (15)");
   EXPECT_EQ(
-      error_of("[mapper]\nlocal_keyframes = 201"),
-      "posed.toml:2:19: mapper.local_keyframes: 201: mapper.local_keyframes (201) must be at most mapper.max_keyframes (200)");
+      error_of("[mapper]\nmax_keyframes = 200\nlocal_keyframes = 201"),
+      "posed.toml:3:19: mapper.local_keyframes: 201: mapper.local_keyframes (201) must be at most mapper.max_keyframes (200)");
   EXPECT_EQ(error_of("[pipeline]\nframe_queue = 15"),
             "posed.toml:2:15: pipeline.frame_queue: 15: pipeline.frame_slots (16) must be at least pipeline.frame_queue (15) + 2");
   for (const std::string thread : {"capture", "tracker", "mapper", "publisher"}) {

@@ -103,6 +103,8 @@ void randomise(const Field& field, std::mt19937_64& random) {
 /// Makes the values agree with the rules that tie keys together.
 void satisfy_rules(Config& c) {
   c.source.replay.sequence = "/recordings/\"quoted\" \\ \t\xC3\xA9";
+  c.source.synthetic.people = c.source.synthetic.world == SyntheticWorldKind::Room ? c.source.synthetic.people : 0;
+  c.map.file = "/maps/hall";
   c.tracker.fast_threshold_minimum = std::min(c.tracker.fast_threshold_minimum, c.tracker.fast_threshold);
   c.tracker.min_inliers = std::min(c.tracker.min_inliers, c.tracker.features - 1);
   c.mapper.local_keyframes = std::min(c.mapper.local_keyframes, c.mapper.max_keyframes);

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -41,8 +42,18 @@ struct TransportLog {
     return result;
   }
 
+  /// A message from outside, which the next `receive` hands on.
+  template <typename T>
+  void arrive(const std::string& channel, const T& value) {
+    Message message{channel, std::vector<std::uint8_t>(static_cast<std::size_t>(value.getEncodedSize()))};
+    value.encode(message.bytes.data(), 0, value.getEncodedSize());
+    const std::lock_guard lock(mutex);
+    arrived.push_back(std::move(message));
+  }
+
   std::mutex mutex;
   std::vector<Message> messages;
+  std::vector<Message> arrived;
   std::atomic<int> opens{0};
   std::atomic<int> opens_to_refuse{0};
   std::atomic<bool> refuse_sends{false};
@@ -71,7 +82,23 @@ class FakeTransport final : public MessageTransport {
     return {};
   }
 
+  void subscribe(const std::string& channel, Handler handler) override { handlers_[channel] = std::move(handler); }
+
+  void receive() override {
+    std::vector<TransportLog::Message> arrived;
+    {
+      const std::lock_guard lock(log_->mutex);
+      arrived = std::exchange(log_->arrived, {});
+    }
+    for (const TransportLog::Message& message : arrived) {
+      if (const auto handler = handlers_.find(message.channel); handler != handlers_.end()) {
+        handler->second(message.bytes);
+      }
+    }
+  }
+
  private:
+  std::map<std::string, Handler> handlers_;
   std::string url_ = "fake://";
   std::shared_ptr<TransportLog> log_;
 };

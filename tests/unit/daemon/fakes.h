@@ -15,8 +15,10 @@
 #include "core/frame_pool.h"
 #include "daemon/slam_ports.h"
 #include "drivers/rgbd_source.h"
+#include "tests/unit/daemon/fake_mapper.h"
 
-/// Stand-ins for clock, source, tracker and mapper, so that the pipeline's own behaviour can be driven step by step.
+/// Stand-ins for clock, source and tracker (and for the mapper, fake_mapper.h), so that the pipeline's own behaviour can be driven
+/// step by step.
 namespace posed {
 
 /// Time that moves only when a test says so; UTC runs `kUtcOffsetNs` ahead of it.
@@ -122,26 +124,6 @@ class FakeTracker final : public FrameTracker {
 
  private:
   KeyframeId keyframes_ = 0;
-};
-
-/// A map that is nothing but its count of keyframes.
-class FakeMapper final : public KeyframeMapper {
- public:
-  std::function<void()> on_insert = [] {};
-
-  void insert(const KeyframeRecord& record) override {
-    on_insert();
-    keyframes_.push_back(record.id);
-  }
-  void write_snapshot(MapSnapshot& snapshot) const override { snapshot.version = keyframes_.size(); }
-  std::optional<Se3> keyframe_pose(KeyframeId id) const override {
-    return id <= keyframes_.size() ? std::optional<Se3>(Se3()) : std::nullopt;
-  }
-  std::size_t keyframe_count() const override { return keyframes_.size(); }
-  std::size_t landmark_count() const override { return 7 * keyframes_.size(); }
-
- private:
-  std::vector<KeyframeId> keyframes_;
 };
 
 }  // namespace posed

@@ -176,6 +176,11 @@ TEST(StatusMessage, CarriesEveryFieldOfTheReport) {
   health.map_landmarks = 13;
   health.peak_rss_bytes = 14;
   health.frames_missed = 15;
+  health.map_saves = 16;
+  health.map_save_errors = 17;
+  health.loops_closed = 18;
+  health.maps_joined = 19;
+  health.relocalizations = 20;
   health.track = {100, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
   health.latency.count = 200;
   health.map.count = 300;
@@ -191,7 +196,8 @@ TEST(StatusMessage, CarriesEveryFieldOfTheReport) {
   const std::vector<std::int64_t> counters = {m.frames_captured, m.frames_skipped, m.frames_no_slot, m.frames_dropped,
                                               m.frames_tracked,  m.frames_lost,    m.keyframes,      m.keyframes_delayed,
                                               m.poses_published, m.poses_dropped,  m.publish_errors, m.map_keyframes,
-                                              m.map_landmarks,   m.peak_rss_bytes, m.frames_missed};
+                                              m.map_landmarks,   m.peak_rss_bytes, m.frames_missed,  m.map_saves,
+                                              m.map_save_errors, m.loops_closed,   m.maps_joined,    m.relocalizations};
   for (std::size_t i = 0; i < counters.size(); ++i) {
     EXPECT_EQ(counters[i], static_cast<std::int64_t>(i) + 1);
   }

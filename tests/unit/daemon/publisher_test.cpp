@@ -1,6 +1,9 @@
 #include "daemon/publisher.h"
 
+#include <cstdint>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include <bot_core/pose_t.hpp>
@@ -172,6 +175,22 @@ TEST(LcmTransport, DeliversWithinTheProcessOverMemq) {
     ASSERT_GT(transport.handle()->handleTimeout(1000), 0);
   }
   EXPECT_EQ(receiver.sequences, (std::vector<std::int64_t>{0, 1, 2}));
+}
+
+TEST(LcmTransport, HandsOnWhatItIsSubscribedTo) {
+  LcmTransport transport("memq://");
+  std::vector<std::string> received;
+  transport.subscribe("T_ASK",
+                      [&](std::span<const std::uint8_t> message) { received.emplace_back(message.begin(), message.end()); });
+  ASSERT_TRUE(transport.open());
+  transport.receive();
+  EXPECT_TRUE(received.empty());
+  for (const std::string channel : {"T_ASK", "T_OTHER", "XT_ASK"}) {
+    const std::string text = "to " + channel;
+    ASSERT_TRUE(transport.send(channel, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}));
+  }
+  transport.receive();
+  EXPECT_EQ(received, std::vector<std::string>{"to T_ASK"});
 }
 
 }  // namespace

@@ -25,6 +25,8 @@ class FakeApp final : public App {
   HealthReport report;
   bool finished = false;
   Status start_status;
+  bool can_save = true;
+  int save_requests = 0;
   int stops = 0;
 
   const SourceInfo& source_info() const override { return info_; }
@@ -35,6 +37,10 @@ class FakeApp final : public App {
   bool wait_finished(TimeNs) override { return finished; }
   void stop() override { ++stops; }
   HealthReport health() const override { return report; }
+  Status request_map_save() override {
+    ++save_requests;
+    return can_save ? Status{} : make_error(ErrorCode::InvalidConfig, "map.file is empty");
+  }
   std::optional<Se3> keyframe_pose(std::uint64_t) const override { return std::nullopt; }
 
  private:
@@ -45,7 +51,7 @@ class SupervisorTest : public ::testing::Test {
  protected:
   SupervisorTest() {
     options_.poll_period_ns = kNsPerMs;
-    EXPECT_TRUE(Supervisor::block_termination_signals());
+    EXPECT_TRUE(Supervisor::block_signals());
   }
 
   SupervisorOptions options_;
@@ -61,6 +67,21 @@ TEST_F(SupervisorTest, SignalsStopThePipeline) {
     ASSERT_TRUE(end) << end.error().message;
     EXPECT_EQ(*end, RunEnd::Signal);
     EXPECT_EQ(app.stops, 1);
+  }
+}
+
+TEST_F(SupervisorTest, SigUsr1HasTheMapSavedAndEndsNothing) {
+  options_.exit_at_end = true;
+  for (const bool possible : {true, false}) {
+    FakeApp app;
+    app.finished = true;  // ends the run at the first poll, which comes after the signal
+    app.can_save = possible;
+    app.on_start = [] { kill(getpid(), SIGUSR1); };
+    Supervisor supervisor(options_);
+    const Result<RunEnd> end = supervisor.run(app);
+    ASSERT_TRUE(end) << end.error().message;
+    EXPECT_EQ(*end, RunEnd::SourceEnded);
+    EXPECT_EQ(app.save_requests, 1);
   }
 }
 
@@ -94,6 +115,7 @@ TEST_F(SupervisorTest, OutlivesTheSourceOtherwise) {
       }
       return app.health();
     }
+    Status request_map_save() override { return app.request_map_save(); }
     std::optional<Se3> keyframe_pose(std::uint64_t) const override { return std::nullopt; }
   } late(app_);
   Supervisor supervisor(options_);

@@ -2,66 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <optional>
-#include <utility>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "core/frame_pool.h"
+#include "tests/unit/drivers/synthetic_studio.h"
 
 namespace posed {
 namespace {
-
-CameraIntrinsics small_camera() {
-  CameraIntrinsics camera;
-  camera.width = 160;
-  camera.height = 120;
-  camera.fx = camera.fy = 131.25;
-  camera.cx = 79.5;
-  camera.cy = 59.5;
-  return camera;
-}
-
-/// One rendered frame, copied out of the views.
-struct Picture {
-  std::vector<std::uint8_t> bgr;
-  std::vector<std::uint8_t> gray;
-  std::vector<float> depth_m;
-  std::vector<std::uint8_t> mask;
-  Se3 T_world_camera;
-
-  float depth(int x, int y, int width) const { return depth_m[static_cast<std::size_t>(y * width + x)]; }
-};
-
-class Studio {
- public:
-  explicit Studio(const SyntheticConfig& config, const CameraIntrinsics& intrinsics = small_camera())
-      : camera_(std::move(*SyntheticCamera::create(config, intrinsics))) {}
-
-  Picture take(std::uint64_t index) {
-    const CameraIntrinsics& k = camera_->intrinsics();
-    const auto pixels = static_cast<std::size_t>(k.width * k.height);
-    Picture picture{std::vector<std::uint8_t>(3 * pixels), std::vector<std::uint8_t>(pixels), std::vector<float>(pixels),
-                    std::vector<std::uint8_t>(pixels), Se3()};
-    RgbdFrame frame;
-    frame.bgr = {picture.bgr.data(), k.width, k.height, 3 * k.width, 3};
-    frame.gray = {picture.gray.data(), k.width, k.height, k.width, 1};
-    frame.depth_m = {picture.depth_m.data(), k.width, k.height, k.width, 1};
-    const Status status = camera_->render(index, frame, {picture.mask.data(), k.width, k.height, k.width, 1});
-    EXPECT_TRUE(status.has_value()) << (status ? "" : status.error().message);
-    EXPECT_EQ(frame.sequence, index);
-    EXPECT_EQ(frame.stamp_utc_ns, SyntheticCamera::kEpochUtc_ns + camera_->due_ns(index));
-    picture.T_world_camera = frame.T_world_camera_truth.value();
-    return picture;
-  }
-
-  SyntheticCamera& camera() { return *camera_; }
-
- private:
-  std::unique_ptr<SyntheticCamera> camera_;
-};
 
 TEST(SyntheticCamera, FrameDependsOnIndexAlone) {
   SyntheticConfig config;
@@ -197,22 +148,7 @@ TEST(SyntheticCamera, PicturesAreRichInTexture) {
   Studio studio(config);
   for (const std::uint64_t index : {0U, 300U, 600U, 900U, 1200U, 1500U}) {
     const Picture picture = studio.take(index);
-    const CameraIntrinsics& k = studio.camera().intrinsics();
-    constexpr int kCell = 40;
-    int rich = 0;
-    for (int cell_y = 0; cell_y < k.height; cell_y += kCell) {
-      for (int cell_x = 0; cell_x < k.width; cell_x += kCell) {
-        int strong = 0;  // pixels with a strong slope across and down: what corners are made of
-        for (int y = cell_y + 1; y < cell_y + kCell - 1; ++y) {
-          for (int x = cell_x + 1; x < cell_x + kCell - 1; ++x) {
-            const std::uint8_t* at = picture.gray.data() + y * k.width + x;
-            strong += std::abs(at[1] - at[-1]) > 16 && std::abs(at[k.width] - at[-k.width]) > 16 ? 1 : 0;
-          }
-        }
-        rich += strong >= 10 ? 1 : 0;
-      }
-    }
-    EXPECT_GE(rich, 9) << "of 12 cells, frame " << index;
+    EXPECT_GE(rich_cells(picture, small_camera()), 9) << "of 12 cells, frame " << index;
   }
 }
 
@@ -223,6 +159,15 @@ TEST(SyntheticCamera, RefusesWhatItCannotDo) {
   ASSERT_FALSE(crowd.has_value());
   EXPECT_EQ(crowd.error().code, ErrorCode::InvalidArgument);
   EXPECT_NE(crowd.error().message.find("source.synthetic.people = 9"), std::string::npos);
+  config.people = 1;
+  config.world = SyntheticWorldKind::Corridor;
+  const auto passer_by = SyntheticCamera::create(config, small_camera());
+  ASSERT_FALSE(passer_by.has_value());
+  EXPECT_EQ(passer_by.error().code, ErrorCode::InvalidArgument);
+  EXPECT_NE(passer_by.error().message.find("source.synthetic.people = 1: only source.synthetic.world = \"room\""),
+            std::string::npos)
+      << passer_by.error().message;
+  config.world = SyntheticWorldKind::Room;
   config.people = 0;
   config.rate_hz = 0;
   EXPECT_FALSE(SyntheticCamera::create(config, small_camera()).has_value());

@@ -8,18 +8,18 @@
 namespace posed {
 namespace {
 
-TEST(SyntheticTrajectory, IsSmoothAndSlow) {
+TEST(SweepTrajectory, IsSmoothAndSlow) {
   constexpr double kStep_s = 0.01;
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
-    const SyntheticTrajectory trajectory(seed);
+    const SweepTrajectory trajectory(seed);
     Se3 previous = trajectory.pose(0);
     Vector6d previous_twist = Vector6d::Zero();
     double fastest = 0;
     for (int i = 1; i < 7000; ++i) {
       const Se3 pose = trajectory.pose(i * kStep_s);
       const Vector6d twist = (previous.inverse() * pose).log() / kStep_s;
-      ASSERT_LT(twist.tail<3>().norm(), SyntheticTrajectory::kMaxSpeed_m_s) << "seed " << seed << ", step " << i;
-      ASSERT_LT(twist.head<3>().norm(), SyntheticTrajectory::kMaxRate_rad_s) << "seed " << seed << ", step " << i;
+      ASSERT_LT(twist.tail<3>().norm(), SweepTrajectory::kMaxSpeed_m_s) << "seed " << seed << ", step " << i;
+      ASSERT_LT(twist.head<3>().norm(), SweepTrajectory::kMaxRate_rad_s) << "seed " << seed << ", step " << i;
       // Acceleration below 1.5 m/s^2 and rad/s^2: no jump in the velocity.
       ASSERT_LT((twist - previous_twist).norm(), 1.5 * kStep_s) << "seed " << seed << ", step " << i;
       fastest = std::max(fastest, twist.tail<3>().norm());
@@ -30,13 +30,13 @@ TEST(SyntheticTrajectory, IsSmoothAndSlow) {
   }
 }
 
-TEST(SyntheticTrajectory, StartsGentlyAndCloses) {
-  const SyntheticTrajectory trajectory(3);
+TEST(SweepTrajectory, StartsGentlyAndCloses) {
+  const SweepTrajectory trajectory(3);
   const Se3 first_second = trajectory.pose(0).inverse() * trajectory.pose(1.0);
   EXPECT_LT(first_second.translation().norm(), 0.1);
   EXPECT_LT(first_second.log().head<3>().norm(), 0.15);
   for (const double t_s : {2.0, 17.3, 44.0}) {
-    const Se3 round = trajectory.pose(t_s).inverse() * trajectory.pose(t_s + 1000 * SyntheticTrajectory::kPeriod_s);
+    const Se3 round = trajectory.pose(t_s).inverse() * trajectory.pose(t_s + 1000 * SweepTrajectory::kPeriod_s);
     EXPECT_LT(round.log().norm(), 1e-7) << "no drift over a thousand rounds, at " << t_s;
   }
 }
@@ -78,8 +78,8 @@ TEST_P(SyntheticRoom, PeopleMoveAsPeopleDo) {
       ASSERT_GT(now[k].base.z(), 0.0F);
       farthest = std::max(farthest, (now[k].base - start[k].base).norm());
       if (k % SyntheticPerson::kParts == 0) {  // the hips stay clear of walls and of what stands there
-        ASSERT_LT(std::abs(now[k].base.x()), SyntheticScene::kHalfLength_m - 0.5F);
-        ASSERT_LT(std::abs(now[k].base.y()), SyntheticScene::kHalfWidth_m - 0.5F);
+        ASSERT_LT(std::abs(now[k].base.x()), world.scene().shell.half_m.x() - 0.5F);
+        ASSERT_LT(std::abs(now[k].base.y()), world.scene().shell.half_m.y() - 0.5F);
       }
     }
     before = now;

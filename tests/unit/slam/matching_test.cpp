@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "slam/keyframe_recovery.h"
-#include "slam/local_mapper.h"
+#include "slam/mapper.h"
 #include "slam/projection_matcher.h"
 #include "tests/support/feature_world.h"
 
@@ -25,7 +25,7 @@ struct MatchingTest : testing::Test {
   Se3 T_map_camera = Se3::exp((Vector6d() << 0.02, 0.05, -0.1, 0.2, 0.1, 0.15).finished());
 
   void SetUp() override {
-    LocalMapper mapper(config, MapperConfig{}, world.intrinsics);
+    Mapper mapper(config, MapperConfig{}, MapMode::Mapping, world.intrinsics);
     mapper.insert(FeatureWorld::record(world.view(Se3(), 0, 0, 0), 1, {}));
     mapper.write_snapshot(map);
   }

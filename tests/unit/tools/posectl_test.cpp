@@ -74,6 +74,8 @@ TEST(Posectl, AWrongCommandLineIsAUsageError) {
            {"replay", "--sequence", "/tmp", "--trajectory", "/tmp/x"},
            {"replay", "--synthetic", "--mode", "flying"},
            {"replay", "--synthetic", "--duration", "-1"},
+           {"replay", "--synthetic", "--localization-only"},
+           {"replay", "--synthetic", "--map-in", "a", "--map-out", "b", "--localization-only"},
            {"synth"},
            {"synth", "--out", "x", "--frames", "3", "--duration", "3"},
            {"synth", "--out", "x", "--size", "big"},

@@ -1,4 +1,4 @@
-#include "slam/local_mapper.h"
+#include "slam/mapper.h"
 
 #include <algorithm>
 #include <set>
@@ -14,7 +14,7 @@ Se3 shifted(double x, double yaw_rad = 0) {
   return Se3::exp((Vector6d() << 0, yaw_rad, 0, x, 0, 0).finished());
 }
 
-struct LocalMapperTest : testing::Test {
+struct MapperTest : testing::Test {
   FeatureWorld world{1};
   TrackerConfig tracker = [] {
     TrackerConfig t;
@@ -23,7 +23,7 @@ struct LocalMapperTest : testing::Test {
   }();
   MapperConfig config;
 
-  MapSnapshot snapshot_of(const LocalMapper& mapper) {
+  MapSnapshot snapshot_of(const Mapper& mapper) {
     MapSnapshot s;
     mapper.write_snapshot(s);
     return s;
@@ -47,8 +47,8 @@ struct LocalMapperTest : testing::Test {
   }
 };
 
-TEST_F(LocalMapperTest, FirstKeyframeTurnsItsDepthsIntoLandmarks) {
-  LocalMapper mapper(tracker, config, world.intrinsics);
+TEST_F(MapperTest, FirstKeyframeTurnsItsDepthsIntoLandmarks) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   const auto view = world.view(Se3());
   mapper.insert(FeatureWorld::record(view, 1, {}));
   const MapSnapshot s = snapshot_of(mapper);
@@ -62,9 +62,9 @@ TEST_F(LocalMapperTest, FirstKeyframeTurnsItsDepthsIntoLandmarks) {
   EXPECT_EQ(s.keyframes[0].landmarks.size(), view.seen.size());
 }
 
-TEST_F(LocalMapperTest, LeavesOutDepthsThatAreMissingOrFar) {
+TEST_F(MapperTest, LeavesOutDepthsThatAreMissingOrFar) {
   tracker.close_depth_m = 2.5;
-  LocalMapper mapper(tracker, config, world.intrinsics);
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   const auto view = world.view(Se3());
   KeyframeRecord record = FeatureWorld::record(view, 1, {});
   record.depth_m[0] = 0;
@@ -73,8 +73,8 @@ TEST_F(LocalMapperTest, LeavesOutDepthsThatAreMissingOrFar) {
   EXPECT_EQ(mapper.landmark_count(), static_cast<std::size_t>(near));
 }
 
-TEST_F(LocalMapperTest, RepeatedMeasurementsSharpenLandmarks) {
-  LocalMapper mapper(tracker, config, world.intrinsics);
+TEST_F(MapperTest, RepeatedMeasurementsSharpenLandmarks) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   mapper.insert(FeatureWorld::record(world.view(Se3(), 1.0, 0.02), 1, {}));
   const double first = mean_error_m(snapshot_of(mapper));
   for (KeyframeId id = 2; id <= 12; ++id) {
@@ -85,8 +85,8 @@ TEST_F(LocalMapperTest, RepeatedMeasurementsSharpenLandmarks) {
   EXPECT_LT(mean_error_m(s), 0.6 * first);
 }
 
-TEST_F(LocalMapperTest, ForgetsLandmarksThatAreNotSeenAgain) {
-  LocalMapper mapper(tracker, config, world.intrinsics);
+TEST_F(MapperTest, ForgetsLandmarksThatAreNotSeenAgain) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   const auto view = world.view(Se3());
   mapper.insert(FeatureWorld::record(view, 1, {}));
   // From the same place, none of the first keyframe's landmarks is matched any more: they were a mover's, say.
@@ -99,20 +99,20 @@ TEST_F(LocalMapperTest, ForgetsLandmarksThatAreNotSeenAgain) {
   EXPECT_LT(mapper.landmark_count(), before / 10);
 }
 
-TEST_F(LocalMapperTest, IgnoresMatchesWithLandmarksItHasCulled) {
-  LocalMapper mapper(tracker, config, world.intrinsics);
+TEST_F(MapperTest, IgnoresMatchesWithLandmarksItHasCulled) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   mapper.insert(FeatureWorld::record(world.view(Se3()), 1, {}));
   const std::vector<LandmarkId> unknown(world.points().size(), 999'999);
   mapper.insert(FeatureWorld::record(world.view(shifted(0.05)), 2, unknown));
   EXPECT_EQ(mapper.keyframe_count(), 2U);
 }
 
-TEST_F(LocalMapperTest, KeepsWithinItsBudgetsAndStillKnowsDroppedPoses) {
+TEST_F(MapperTest, KeepsWithinItsBudgetsAndStillKnowsDroppedPoses) {
   config.max_keyframes = 8;
   config.local_keyframes = 4;
   config.local_landmarks = 300;
   config.recovery_keyframes = 5;
-  LocalMapper mapper(tracker, config, world.intrinsics);
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   std::vector<Se3> poses;
   for (KeyframeId id = 1; id <= 30; ++id) {
     poses.push_back(shifted(0.03 * static_cast<double>(id)));
@@ -134,8 +134,8 @@ TEST_F(LocalMapperTest, KeepsWithinItsBudgetsAndStillKnowsDroppedPoses) {
   EXPECT_FALSE(mapper.keyframe_pose(kNoKeyframe));
 }
 
-TEST_F(LocalMapperTest, ANewMapReplacesTheOldOneButKeepsItsPoses) {
-  LocalMapper mapper(tracker, config, world.intrinsics);
+TEST_F(MapperTest, ANewMapReplacesAYoungOneButKeepsItsPoses) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   mapper.insert(FeatureWorld::record(world.view(shifted(0.5)), 1, {}));
   const MapSnapshot old_map = snapshot_of(mapper);
   KeyframeRecord record = FeatureWorld::record(world.view(Se3()), 2, {});
@@ -150,8 +150,8 @@ TEST_F(LocalMapperTest, ANewMapReplacesTheOldOneButKeepsItsPoses) {
   EXPECT_LT((mapper.keyframe_pose(1)->inverse() * shifted(0.5)).log().norm(), 1e-9);
 }
 
-TEST_F(LocalMapperTest, SnapshotOfAnEmptyMapSaysSo) {
-  LocalMapper mapper(tracker, config, world.intrinsics);
+TEST_F(MapperTest, SnapshotOfAnEmptyMapSaysSo) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   const MapSnapshot s = snapshot_of(mapper);
   EXPECT_EQ(s.version, 0U);
   EXPECT_EQ(s.newest_keyframe, kNoKeyframe);

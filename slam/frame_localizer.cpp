@@ -1,0 +1,98 @@
+#include "slam/frame_localizer.h"
+
+#include <utility>
+
+#include "core/clock.h"
+
+namespace posed {
+
+namespace {
+
+constexpr float kLocalMapRadius = 5.0F;  // [pixels on level 0] around the local map's landmarks once the pose is nearly known
+
+}  // namespace
+
+FrameLocalizer::FrameLocalizer(const PinholeCamera& camera, const TrackerConfig& config, std::size_t landmark_capacity)
+    : camera_(camera), noise_(config, camera.intrinsics()), matcher_(camera, config) {
+  const std::size_t features = feature_capacity(config.features);
+  landmark_of_.reserve(features);
+  observations_.reserve(features);
+  observed_keypoint_.reserve(features);
+  projected_.reserve(landmark_capacity);
+  landmark_taken_.reserve(landmark_capacity);
+}
+
+void FrameLocalizer::reset(const FeatureFrame& frame) {
+  landmark_of_.assign(frame.size(), kUnmatched);
+  matches_ = 0;
+  solution_ = PoseSolution{};
+}
+
+void FrameLocalizer::begin_at(const FeatureFrame& frame, const Se3& T_map_camera) {
+  reset(frame);
+  solution_.T_map_camera = T_map_camera;
+  solution_.solved = true;
+}
+
+void FrameLocalizer::match(const MapSnapshot& map, const FeatureFrame& frame, std::span<const LandmarkId> wanted,
+                           const Se3& T_map_camera, float radius) {
+  // Both lists ascend, so one walk finds the wanted landmarks.
+  std::size_t next = 0;
+  const auto is_wanted = [&](std::uint32_t l) {
+    while (next < wanted.size() && wanted[next] < map.landmarks[l].id) {
+      ++next;
+    }
+    return wanted.empty() || (next < wanted.size() && wanted[next] == map.landmarks[l].id);
+  };
+  matcher_.project_where(map, T_map_camera, frame, is_wanted, projected_);
+  landmark_of_.assign(frame.size(), kUnmatched);
+  MatchOptions options;
+  options.radius = radius;
+  matches_ = matcher_.match(map, projected_, frame, options, landmark_of_);
+}
+
+bool FrameLocalizer::solve(const MapSnapshot& map, const FeatureFrame& frame, const Se3& initial) {
+  const TimeNs begin_ns = SystemClock::instance().now_ns();
+  observations_.clear();
+  observed_keypoint_.clear();
+  for (std::size_t i = 0; i < landmark_of_.size(); ++i) {
+    if (landmark_of_[i] == kUnmatched) {
+      continue;
+    }
+    const int level = frame.features().keypoints[i].level;
+    const double z = frame.depth_m()[i];
+    observations_.push_back({map.landmarks[static_cast<std::size_t>(landmark_of_[i])].p_map.cast<double>(),
+                             frame.ideal_pixels()[i].cast<double>(), frame.disparity()[i], noise_.pixel_weight(level),
+                             z > 0 ? noise_.disparity_weight(level, z) : 0.0, true});
+    observed_keypoint_.push_back(static_cast<std::uint16_t>(i));
+  }
+  solution_ = solve_pose(camera_, initial, observations_);
+  for (std::size_t j = 0; j < observations_.size(); ++j) {
+    if (!observations_[j].inlier) {
+      landmark_of_[observed_keypoint_[j]] = kUnmatched;
+    }
+  }
+  solve_ns_ += SystemClock::instance().now_ns() - begin_ns;
+  return solution_.solved;
+}
+
+bool FrameLocalizer::refine(const MapSnapshot& map, const FeatureFrame& frame, int min_inliers) {
+  landmark_taken_.assign(map.landmarks.size(), 0);
+  for (const std::int32_t landmark : landmark_of_) {
+    if (landmark != kUnmatched) {
+      landmark_taken_[static_cast<std::size_t>(landmark)] = 1;
+    }
+  }
+  const auto is_free = [&](std::uint32_t l) { return landmark_taken_[l] == 0; };
+  matcher_.project_where(map, solution_.T_map_camera, frame, is_free, projected_);
+  MatchOptions options;
+  options.radius = kLocalMapRadius;
+  matches_ += matcher_.match(map, projected_, frame, options, landmark_of_);
+  return solve(map, frame, solution_.T_map_camera) && solution_.inliers >= min_inliers;
+}
+
+TimeNs FrameLocalizer::take_solve_ns() {
+  return std::exchange(solve_ns_, 0);
+}
+
+}  // namespace posed
