@@ -65,7 +65,7 @@ struct Tracker::Impl {
   // This frame.
   FeatureFrame frame;
   std::uint64_t sequence = 0;
-  std::int64_t stamp_utc_ns = 0;
+  std::int64_t stamp_utc_ns = 0;  // 0: no frame yet
   bool starts_map = false;
   Se3 T_map_odom;
   Timing timing;
@@ -295,7 +295,8 @@ void Tracker::Impl::find_camera(const MapSnapshot& map) {
 PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map, KeyframeRecord* candidate) {
   const TimeNs begin_ns = now_ns();
   timing = Timing{};
-  const TimeNs elapsed_ns = std::max<TimeNs>(0, rgbd.stamp_utc_ns - stamp_utc_ns);
+  // Before the first frame no time has passed: a loaded map is searched for as long as any other.
+  const TimeNs elapsed_ns = stamp_utc_ns == 0 ? 0 : std::max<TimeNs>(0, rgbd.stamp_utc_ns - stamp_utc_ns);
   sequence = rgbd.sequence;
   stamp_utc_ns = rgbd.stamp_utc_ns;
   extractor.extract(rgbd.gray, frame.features());
