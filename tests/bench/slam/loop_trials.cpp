@@ -11,7 +11,8 @@
 // T_map_camera before and after the closure that corrected most, and by how much it moved the camera; closures; false ones (after
 // which the error is larger by more than 0.1 m); matches refused as implausible; the share of the frames after the first round
 // whose pose relative to the same frame one round earlier is right to 0.05 m in the final trajectory; absolute trajectory error
-// (root mean square after alignment) of the poses as they were published, and of the final ones; frames without a pose.
+// (root mean square after alignment) of the poses as they were published, and of the final ones; maps begun, more than one where
+// the camera was lost for long (errors then count from the last map's first frame); frames without a pose.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -64,6 +65,13 @@ class Trial {
     std::uint64_t closed = 0;
     for (std::uint64_t i = 0; i < frames_; ++i) {
       estimates_.push_back(rig_.track(i));
+      if (const PoseEstimate& e = estimates_.back(); e.has_pose() && e.map_id > maps_) {
+        maps_ = e.map_id;
+        T_map_world_ = e.T_map_camera() * rig_.true_pose(i).inverse();
+      }
+      if (i + 1 == rig_.frames_a_round()) {
+        odom_drift_m_ = distance_between_m(estimates_.back().T_odom_camera, T_map_world_ * rig_.true_pose(i));
+      }
       if (std::exchange(awaited_, false)) {
         finish_closure(i);
       }
@@ -80,14 +88,12 @@ class Trial {
     const auto wrong =
         std::count_if(closures_.begin(), closures_.end(), [](const Closure& c) { return c.after_m > c.before_m + kFalse_m; });
     const Closure shown = most == closures_.end() ? Closure{} : *most;
-    const std::uint64_t round_end = rig_.frames_a_round() - 1;
-    fmt::print("{:<28} {:>6} {:>7} {:>6} {:>7} {:>6} {:>6} {:>8} {:>9} {:>7} {:>7} {:>5}\n", "run", "odom", "before", "after",
-               "correct", "closed", "false", "refused", "rejoined", "ATE on", "ATE fin", "lost");
-    fmt::print("{:<28} {:>6.3f} {:>7.3f} {:>6.3f} {:>7.3f} {:>6} {:>6} {:>8} {:>8.1f}% {:>7.3f} {:>7.3f} {:>5}\n", name,
-               rig_.odom_error_m(round_end, estimates_[round_end]), shown.before_m, shown.after_m, shown.correction_m,
-               closures_.size(), wrong, rig_.mapper().counters().loops_implausible, 100 * rejoined(), ate_m(trajectory(false)),
-               ate_m(trajectory(true)),
-               std::count_if(estimates_.begin(), estimates_.end(), [](const PoseEstimate& e) { return !e.has_pose(); }));
+    fmt::print("{:<28} {:>6} {:>7} {:>6} {:>7} {:>6} {:>6} {:>8} {:>9} {:>7} {:>7} {:>4} {:>5}\n", "run", "odom", "before", "after",
+               "correct", "closed", "false", "refused", "rejoined", "ATE on", "ATE fin", "maps", "lost");
+    fmt::print("{:<28} {:>6.3f} {:>7.3f} {:>6.3f} {:>7.3f} {:>6} {:>6} {:>8} {:>8.1f}% {:>7.3f} {:>7.3f} {:>4} {:>5}\n", name,
+               odom_drift_m_, shown.before_m, shown.after_m, shown.correction_m, closures_.size(), wrong,
+               rig_.mapper().counters().loops_implausible, 100 * rejoined(), ate_m(trajectory(false)), ate_m(trajectory(true)),
+               maps_, std::count_if(estimates_.begin(), estimates_.end(), [](const PoseEstimate& e) { return !e.has_pose(); }));
   }
 
  private:
@@ -99,13 +105,17 @@ class Trial {
     }
     const Se3 step = before.T_odom_camera.inverse() * after.T_odom_camera;
     const Se3 true_step = rig_.true_pose(i - 1).inverse() * rig_.true_pose(i);
-    closures_.push_back({i, rig_.error_m(i - 1, before), rig_.error_m(i, after),
+    closures_.push_back({i, error_m(i - 1), error_m(i),
                          distance_between_m(before.T_map_odom * after.T_odom_camera, after.T_map_camera()),
                          distance_between_m(step, true_step)});
     const Closure& c = closures_.back();
     fmt::print("frame {}: error {:.3f} -> {:.3f} m, corrected by {:.3f} m, step in odom {:.4f} m from the true one\n", c.frame,
                c.before_m, c.after_m, c.correction_m, c.odom_step_error_m);
     std::fflush(stdout);
+  }
+
+  double error_m(std::uint64_t i) const {
+    return distance_between_m(estimates_[i].T_map_camera(), T_map_world_ * rig_.true_pose(i));
   }
 
   double rejoined() const {
@@ -138,6 +148,9 @@ class Trial {
   std::vector<PoseEstimate> estimates_;
   std::vector<Closure> closures_;
   bool awaited_ = false;
+  std::uint32_t maps_ = 0;
+  Se3 T_map_world_;
+  double odom_drift_m_ = 0;
 };
 
 std::optional<SyntheticWorldKind> world_of(std::string_view name) {
