@@ -185,7 +185,7 @@ Result<std::optional<LoopCorrection>> LoopCloser::close(KeyframeId keyframe) {
   return std::optional(*corrected);
 }
 
-/// The best candidate that geometry confirms and the path travelled allows.
+/// The best candidate that geometry confirms and drift explains.
 std::optional<LoopCloser::Detection> LoopCloser::detect(KeyframeId keyframe) {
   const Keyframe& k = *map_.find_keyframe(keyframe);
   const std::unordered_map<KeyframeId, double> path_m = paths_m(map_, keyframe);
