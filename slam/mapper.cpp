@@ -174,12 +174,12 @@ void Mapper::Impl::renew_anchor(const Matrix6d& given_map) {
   }
   const double enough = std::min(kAnchorShare * static_cast<double>(seen), static_cast<double>(most_shared));
   anchor = newest;
-  keyframe.covariance = given_map + drift_model::start_covariance();
+  keyframe.covariance = given_map + start_covariance();
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [id, shared] : keyframe.covisible) {
     const Keyframe& other = *map.find_keyframe(id);
     const Matrix6d covariance =
-        drift_model::pose_covariance(given_map, other.T_map_camera.inverse() * keyframe.T_map_camera, other.covariance);
+        drifted_covariance(given_map, other.T_map_camera.inverse() * keyframe.T_map_camera, other.covariance);
     if (shared >= enough && covariance.trace() < least) {
       least = covariance.trace();
       keyframe.covariance = covariance;

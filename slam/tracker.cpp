@@ -244,11 +244,10 @@ bool Tracker::Impl::may_ask(const MapSnapshot& map) const {
 /// The solver's covariance takes the landmarks as exact; their own error is that of the keyframe they hang on.
 Matrix6d Tracker::Impl::covariance_with_drift(const MapSnapshot& map) const {
   if (starts_map) {
-    return drift_model::start_covariance();
+    return start_covariance();
   }
   const PoseSolution& solution = localizer.solution();
-  return drift_model::pose_covariance(solution.covariance, map.T_map_anchor.inverse() * solution.T_map_camera,
-                                      map.anchor_covariance);
+  return drifted_covariance(solution.covariance, map.T_map_anchor.inverse() * solution.T_map_camera, map.anchor_covariance);
 }
 
 /// Keeps what the next frame is predicted from.
