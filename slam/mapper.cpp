@@ -7,6 +7,7 @@
 
 #include "core/clock.h"
 #include "core/logging.h"
+#include "slam/drift_model.h"
 #include "slam/dropped_keyframes.h"
 #include "slam/landmark_estimator.h"
 #include "slam/local_map.h"
@@ -156,25 +157,28 @@ void Mapper::Impl::insert_keyframe(const KeyframeRecord& record) {
   pending.close_loop = config.loop_closing;
 }
 
-/// A keyframe inherits the drift of the best keyframe that shares enough of its landmarks.
+/// A keyframe inherits the drift of the keyframe that leaves it least uncertain, of those that share enough of its landmarks.
 void Mapper::Impl::renew_anchor(const Matrix6d& given_map) {
   Keyframe& keyframe = *map.find_keyframe(newest);
   const auto seen =
       std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(), [](LandmarkId id) { return id != kNoLandmark; });
+  int most_shared = 0;
+  for (const auto& [id, shared] : keyframe.covisible) {
+    most_shared = std::max(most_shared, shared);
+  }
+  const double enough = std::min(kAnchorShare * static_cast<double>(seen), static_cast<double>(most_shared));
   anchor = newest;
+  keyframe.covariance = given_map + start_covariance();
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [id, shared] : keyframe.covisible) {
-    const double drift = map.find_keyframe(id)->covariance.trace();
-    if (shared >= kAnchorShare * static_cast<double>(seen) && drift < least) {
-      least = drift;
+    const Keyframe& other = *map.find_keyframe(id);
+    const Matrix6d covariance =
+        drifted_covariance(given_map, other.T_map_camera.inverse() * keyframe.T_map_camera, other.covariance);
+    if (shared >= enough && covariance.trace() < least) {
+      least = covariance.trace();
+      keyframe.covariance = covariance;
       anchor = id;
     }
-  }
-  keyframe.covariance = given_map;
-  if (anchor != newest) {
-    const Keyframe& a = *map.find_keyframe(anchor);
-    const Matrix6d to_camera = (keyframe.T_map_camera.inverse() * a.T_map_camera).adjoint();
-    keyframe.covariance += to_camera * a.covariance * to_camera.transpose();
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/clock.h"
+#include "slam/drift_model.h"
 #include "slam/feature_frame.h"
 #include "slam/frame_localizer.h"
 #include "slam/keyframe_recovery.h"
@@ -244,13 +245,13 @@ bool Tracker::Impl::may_ask(const MapSnapshot& map) const {
   return has_map && map.version > 0 && state != TrackingState::Initializing && !waiting && can_initialize();
 }
 
-/// What the landmarks' own error, which they share with the keyframe they hang on, adds to the error given them.
+/// The solver's covariance takes the landmarks as exact; their own error is that of the keyframe they hang on.
 Matrix6d Tracker::Impl::covariance_with_drift(const MapSnapshot& map) const {
   if (starts_map) {
-    return localizer.solution().covariance;
+    return start_covariance();
   }
-  const Matrix6d to_camera = (localizer.solution().T_map_camera.inverse() * map.T_map_anchor).adjoint();
-  return localizer.solution().covariance + to_camera * map.anchor_covariance * to_camera.transpose();
+  const PoseSolution& solution = localizer.solution();
+  return drifted_covariance(solution.covariance, map.T_map_anchor.inverse() * solution.T_map_camera, map.anchor_covariance);
 }
 
 /// Keeps what the next frame is predicted from.

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "slam/drift_model.h"
 #include "tests/support/feature_world.h"
 #include "tests/support/temporary_folder.h"
 
@@ -273,6 +274,33 @@ TEST_F(MapperTest, AFileThatCannotBeLoadedChangesNothing) {
   EXPECT_EQ(snapshot_of(mapper).version, 0U);
   mapper.insert(FeatureWorld::record(world.view(Se3()), 1, {}));
   EXPECT_EQ(mapper.keyframe_count(), 1U);
+}
+
+TEST_F(MapperTest, UncertaintyGrowsOnTheWayOutAndShrinksOnTheWayBack) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  // Along x, so far that the last view shows nothing of the first, and back.
+  constexpr int kSteps = 12;
+  constexpr double kStep_m = 0.3;
+  std::vector<double> variances_m2;
+  for (int i = 0; i <= 2 * kSteps; ++i) {
+    const Se3 T_map_camera = shifted(-1.8 + kStep_m * (i <= kSteps ? i : 2 * kSteps - i));
+    const auto known = landmarks_by_point(snapshot_of(mapper));
+    KeyframeRecord record = FeatureWorld::record(world.view(T_map_camera), static_cast<KeyframeId>(i) + 1, known);
+    record.covariance = i == 0 ? Matrix6d::Zero() : isotropic_covariance(1e-8, 1e-8);
+    mapper.insert(record);
+    const MapSnapshot s = snapshot_of(mapper);
+    const Matrix6d covariance = drifted_covariance(record.covariance, s.T_map_anchor.inverse() * T_map_camera, s.anchor_covariance);
+    variances_m2.push_back(covariance.bottomRightCorner<3, 3>().trace());
+  }
+  const double out_m2 = variances_m2[kSteps];
+  for (int i = 4; i <= kSteps; i += 4) {
+    EXPECT_GT(variances_m2[static_cast<std::size_t>(i)], 1.2 * variances_m2[static_cast<std::size_t>(i) - 4]) << i;
+  }
+  // At least what a random walk over the way makes.
+  EXPECT_GE(out_m2, 3 * kSteps * kStep_m * DriftRates{}.sigma_m * DriftRates{}.sigma_m);
+  for (int i = 0; i <= kSteps; i += 4) {
+    EXPECT_LT(variances_m2[static_cast<std::size_t>(2 * kSteps - i)], 1.5 * variances_m2[static_cast<std::size_t>(i)] + 1e-6) << i;
+  }
 }
 
 TEST_F(MapperTest, SnapshotOfAnEmptyMapSaysSo) {

@@ -2,8 +2,10 @@
 
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
+#include "slam/drift_model.h"
 #include "tests/support/slam_rig.h"
 
 namespace posed {
@@ -30,12 +32,35 @@ TEST(Tracker, StartsAtTheConfiguredPoseAndSaysHowSureItIs) {
   const PoseEstimate first = rig.track(0);
   EXPECT_TRUE(first.keyframe);
   EXPECT_EQ(first.T_map_camera().translation(), Eigen::Vector3d::Zero());
-  EXPECT_TRUE(first.covariance.isZero()) << "the first frame defines the map";
+  EXPECT_EQ(first.covariance, start_covariance()) << "the first frame defines the map, as well as it measures";
   const PoseEstimate second = rig.track(1);
   ASSERT_TRUE(second.has_pose());
   EXPECT_GT(second.covariance.diagonal().minCoeff(), 0.0);
   EXPECT_LT(second.covariance.diagonal().maxCoeff(), 1e-2);
   EXPECT_LT((second.covariance - second.covariance.transpose()).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST(Tracker, ItsErrorsAreWhatItsCovarianceSays) {
+  SlamRig rig;
+  int frames = 0;
+  int in_band = 0;
+  double last_trace = 0;
+  for (std::uint64_t i = 0; i < 300; i += 3) {
+    const PoseEstimate estimate = rig.track(i);
+    ASSERT_TRUE(estimate.has_pose()) << i;
+    const Eigen::LLT<Matrix6d> factor(estimate.covariance);
+    ASSERT_EQ(factor.info(), Eigen::Success) << "frame " << i << ": filters need a positive definite matrix";
+    ASSERT_LT((estimate.covariance - estimate.covariance.transpose()).cwiseAbs().maxCoeff(), 1e-15);
+    if (i > 0) {
+      const Vector6d xi = (estimate.T_map_camera().inverse() * rig.true_pose_in_map(i)).log();
+      const double nees = xi.dot(factor.solve(xi));
+      ++frames;
+      in_band += nees > 1.237 && nees < 14.449 ? 1 : 0;  // 95 % of chi-squared with 6 degrees of freedom
+    }
+    last_trace = estimate.covariance.trace();
+  }
+  EXPECT_GE(in_band, 0.85 * frames);
+  EXPECT_GT(last_trace, 2 * start_covariance().trace()) << "it is no longer where it began";
 }
 
 TEST(Tracker, GivesTheSameBitsTwice) {
