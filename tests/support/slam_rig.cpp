@@ -122,10 +122,6 @@ double SlamRig::error_m(std::uint64_t index, const PoseEstimate& estimate) const
   return distance_between_m(estimate.T_map_camera(), true_pose_in_map(index));
 }
 
-double SlamRig::odom_error_m(std::uint64_t index, const PoseEstimate& estimate) const {
-  return distance_between_m(estimate.T_odom_camera, true_pose_in_map(index));
-}
-
 Se3 SlamRig::place_in(const SavedMap& saved, const Se3& T_world_camera) const {
   double least = std::numeric_limits<double>::infinity();
   Se3 T_map_camera;

@@ -62,12 +62,11 @@ class SlamRig {
   Se3 true_pose_in_map(std::uint64_t index) const { return true_pose_on_path(0).inverse() * true_pose(index); }
   /// Distance [m] between estimate and truth, in that frame.
   double error_m(std::uint64_t index, const PoseEstimate& estimate) const;
-  double odom_error_m(std::uint64_t index, const PoseEstimate& estimate) const;
 
   /// Where `T_world_camera` is in the map as it was saved, drift included: relative to the nearest of its keyframes that is left.
   Se3 place_in(const SavedMap& saved, const Se3& T_world_camera) const;
 
-  /// The estimates' present poses, as far as there are any: the map's corrections since are in them.
+  /// T_map_camera of an estimate made before, with what the map was corrected by since; nothing where it had no pose.
   std::optional<Se3> final_pose(const PoseEstimate& estimate) const;
 
   std::uint64_t frames_a_round() const;
