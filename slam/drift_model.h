@@ -8,7 +8,7 @@
 namespace posed {
 
 /// How fast the map drifts: standard deviation of each axis after one metre. The variance grows with the distance, as that of a
-/// random walk. Calibrated by `consistency_bench 1 4`, confirmed by `consistency_bench 5 8`.
+/// random walk. Calibrated on the runs of `consistency_bench 1 4`, checked by `consistency_bench 5 8`.
 struct DriftRates {
   double sigma_rad = 1.2e-3;
   double sigma_m = 4.4e-3;
