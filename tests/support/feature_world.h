@@ -9,6 +9,7 @@
 #include "config/config.h"
 #include "core/pinhole_camera.h"
 #include "core/se3.h"
+#include "slam/descriptor.h"
 #include "slam/feature_frame.h"
 #include "slam/keyframe_record.h"
 
@@ -137,19 +138,10 @@ class FeatureWorld {
 };
 
 inline std::size_t FeatureWorld::point_of(const Descriptor& descriptor) const {
-  std::size_t best = 0;
-  int least = 257;
-  for (std::size_t i = 0; i < descriptors_.size(); ++i) {
-    int distance = 0;
-    for (std::size_t w = 0; w < descriptor.size(); ++w) {
-      distance += __builtin_popcountll(descriptor[w] ^ descriptors_[i][w]);
-    }
-    if (distance < least) {
-      least = distance;
-      best = i;
-    }
-  }
-  return best;
+  const auto nearest = std::min_element(descriptors_.begin(), descriptors_.end(), [&](const Descriptor& a, const Descriptor& b) {
+    return hamming_distance(a, descriptor) < hamming_distance(b, descriptor);
+  });
+  return static_cast<std::size_t>(nearest - descriptors_.begin());
 }
 
 }  // namespace posed
