@@ -184,7 +184,8 @@ void add_mapper(SchemaBuilder& schema, MapperConfig& c) {
            "effect in lockstep.")
       .key("loop_closing", BoolField{&c.loop_closing}, "", "Look for places that were seen before, and correct the map by them.")
       .key("loop_max_drift", real(c.loop_max_drift, 0.001, 1.0), "",
-           "Largest drift to be believed, as a share of the path travelled since the place was seen: a closure that asks for more "
+           "Largest drift to be believed, as a share of the shortest path in the map between the two views: a closure that asks "
+           "for more "
            "is taken for a place that looks alike, and refused.");
 }
 

@@ -31,7 +31,7 @@ MapRequests::MapRequests(MapSaver& saver, std::function<void()> wake, const Cloc
     : saver_(saver), wake_(std::move(wake)), clock_(clock) {}
 
 void MapRequests::receive(std::span<const std::uint8_t> message) {
-  map_request_t request;
+  map_request_t request{};
   const int size = static_cast<int>(message.size());
   if (request.decode(message.data(), 0, size) != size) {
     return;

@@ -33,7 +33,8 @@ class LocalMapper {
   BundleSummary adjust(KeyframeId keyframe, const Interrupt& interrupt);
 
   /// Neighbours of `keyframe` nearly all of whose landmarks at least three other keyframes see at least as well (Mur-Artal,
-  /// Montiel, Tardos, "ORB-SLAM", T-RO 2015, section VI-E); never those of `kept`, nor a map's oldest.
+  /// Montiel, Tardos, "ORB-SLAM", T-RO 2015, section VI-E); never one of the `kept_newest` newest, nor a root of the spanning tree,
+  /// nor one that holds a loop together.
   std::vector<KeyframeId> redundant_keyframes(KeyframeId keyframe, std::size_t kept_newest) const;
 
   /// Share of a keyframe's landmarks that at least three others see at least as well, 0 to 1.

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
+#include <queue>
 #include <unordered_map>
 #include <utility>
 
@@ -23,6 +26,7 @@ constexpr double kDriftFloor_m = 0.2;  // always plausible
 constexpr double kDriftFloor_rad = 0.1;
 constexpr double kDriftRate_rad_m = 0.05;     // of the path
 constexpr double kShortestLoop_m = 1.5;       // path between two keyframes for a loop to be worth closing
+constexpr int kLinkShared = 15;               // landmarks that hold two keyframes together
 constexpr std::size_t kAroundKeyframes = 10;  // whose landmarks a candidate is verified against
 constexpr std::size_t kAroundLandmarks = 3000;
 constexpr int kEssentialShared = 100;  // landmarks that make an edge of the essential graph
@@ -37,6 +41,48 @@ Matrix6d edge_information() {
   weights.head<3>().setConstant(1.0 / (kEdgeSigma_rad * kEdgeSigma_rad));
   weights.tail<3>().setConstant(1.0 / (kEdgeSigma_m * kEdgeSigma_m));
   return weights.asDiagonal();
+}
+
+/// Length of the shortest path [m] from `from` to every keyframe of its map over what holds them together: shared landmarks, the
+/// spanning tree, loops closed before. It is along this path that their relative pose drifts, however long the camera has travelled
+/// since. Source: Dijkstra, "A note on two problems in connexion with graphs", 1959. Those it does not reach are left out.
+std::unordered_map<KeyframeId, double> paths_m(const Map& map, KeyframeId from) {
+  std::unordered_map<KeyframeId, std::vector<KeyframeId>> one_way;  // links that only one of the two keyframes knows of
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (keyframe.parent != kNoKeyframe) {
+      one_way[keyframe.parent].push_back(id);
+      one_way[id].push_back(keyframe.parent);
+    }
+    for (const LoopConstraint& loop : keyframe.loops) {
+      one_way[loop.other].push_back(id);
+      one_way[id].push_back(loop.other);
+    }
+  }
+  std::unordered_map<KeyframeId, double> length_m;
+  using Reached = std::pair<double, KeyframeId>;
+  std::priority_queue<Reached, std::vector<Reached>, std::greater<>> front;
+  front.emplace(0.0, from);
+  while (!front.empty()) {
+    const auto [length, id] = front.top();
+    front.pop();
+    if (!length_m.emplace(id, length).second) {
+      continue;
+    }
+    const Keyframe& keyframe = *map.find_keyframe(id);
+    const auto reach = [&](KeyframeId other) {
+      if (!length_m.contains(other)) {
+        const Se3& T_map_other = map.find_keyframe(other)->T_map_camera;
+        front.emplace(length + (T_map_other.translation() - keyframe.T_map_camera.translation()).norm(), other);
+      }
+    };
+    for (const auto& [other, shared] : keyframe.covisible) {
+      if (shared >= kLinkShared) {
+        reach(other);
+      }
+    }
+    std::for_each(one_way[id].begin(), one_way[id].end(), reach);
+  }
+  return length_m;
 }
 
 /// The spanning tree, loops closed before, and pairs that share much (Mur-Artal, Montiel, Tardos, "ORB-SLAM", T-RO 2015,
@@ -139,13 +185,16 @@ Result<std::optional<LoopCorrection>> LoopCloser::close(KeyframeId keyframe) {
   return std::optional(*corrected);
 }
 
-/// The best candidate that geometry confirms and the path travelled allows.
+/// The best candidate that geometry confirms and drift explains.
 std::optional<LoopCloser::Detection> LoopCloser::detect(KeyframeId keyframe) {
   const Keyframe& k = *map_.find_keyframe(keyframe);
+  const std::unordered_map<KeyframeId, double> path_m = paths_m(map_, keyframe);
+  const auto path_to = [&](KeyframeId id) {
+    const auto path = path_m.find(id);
+    return path == path_m.end() ? std::numeric_limits<double>::infinity() : path->second;
+  };
   const auto is_elsewhere = [&](KeyframeId id) {
-    const Keyframe& other = *map_.find_keyframe(id);
-    return other.map_id != k.map_id ||
-           (id != keyframe && !k.covisible.contains(id) && k.travelled_m - other.travelled_m >= kShortestLoop_m);
+    return id != keyframe && !k.covisible.contains(id) && path_to(id) >= kShortestLoop_m;
   };
   places_.query(k.features.descriptors, kCandidates, is_elsewhere, candidates_);
   if (candidates_.empty()) {
@@ -162,7 +211,7 @@ std::optional<LoopCloser::Detection> LoopCloser::detect(KeyframeId keyframe) {
     ++counters_.verified;
     Detection detection{keyframe, candidate.keyframe, map_.find_keyframe(candidate.keyframe)->map_id, keyframes_seen_,
                         std::move(*match)};
-    if (!is_plausible(detection)) {
+    if (!is_plausible(detection, path_to(candidate.keyframe))) {
       ++counters_.implausible;
       continue;
     }
@@ -174,13 +223,12 @@ std::optional<LoopCloser::Detection> LoopCloser::detect(KeyframeId keyframe) {
 }
 
 /// Rooms that look alike pass every test of appearance and geometry; that the camera should have drifted from one to the other does
-/// not. Between maps nothing is known of their distance.
-bool LoopCloser::is_plausible(const Detection& detection) const {
+/// not. Between maps there is no path, and nothing is known of their distance.
+bool LoopCloser::is_plausible(const Detection& detection, double path_m) const {
   const Keyframe& k = *map_.find_keyframe(detection.keyframe);
   if (detection.matched_map != k.map_id) {
     return true;
   }
-  const double path_m = k.travelled_m - map_.find_keyframe(detection.matched)->travelled_m;
   const Vector6d asked = (k.T_map_camera.inverse() * detection.match.T_map_camera).log();
   return asked.tail<3>().norm() <= kDriftFloor_m + config_.loop_max_drift * path_m &&
          asked.head<3>().norm() <= kDriftFloor_rad + kDriftRate_rad_m * path_m;

@@ -35,8 +35,9 @@ struct LoopCounters {
 };
 
 /// Finds out that the camera is at a place it has seen before, and corrects the map by it. A closure needs: candidates by
-/// appearance (PlaceRecognizer); agreement in geometry (PlaceVerifier); a correction that the path travelled since explains; and
-/// the same correction from `kAgreeing` keyframes of the last few. Thread-bound to the mapper.
+/// appearance (PlaceRecognizer); agreement in geometry (PlaceVerifier); a correction that the drift along the shortest path in
+/// the map's graph between the two keyframes explains; and the same correction from `kAgreeing` keyframes of the last few.
+/// Thread-bound to the mapper.
 class LoopCloser {
  public:
   /// Everything passed in must outlive it.
@@ -60,7 +61,7 @@ class LoopCloser {
   };
 
   std::optional<Detection> detect(KeyframeId keyframe);
-  bool is_plausible(const Detection& detection) const;
+  bool is_plausible(const Detection& detection, double path_m) const;
   bool is_agreed(const Detection& detection);
   Result<LoopCorrection> correct_loop(const Detection& detection);
   LoopCorrection join_maps(const Detection& detection);

@@ -41,7 +41,6 @@ struct Keyframe {
   TimeNs capture_ns = 0;
   Se3 T_map_camera;
   Matrix6d covariance = Matrix6d::Zero();  ///< of T_map_camera against the map's first keyframe, as in PoseEstimate
-  double travelled_m = 0;                  ///< path length from the map's first keyframe
 
   Features features;
   std::vector<Eigen::Vector2f> ideal_pixels;

@@ -94,7 +94,7 @@ std::string broken_rule(KeyframeId id, const Keyframe& keyframe, const MapHeader
   if (keyframe.map_id > header.highest_map) {
     return fmt::format("keyframe {}: is of map {}, the highest is {}", id, keyframe.map_id, header.highest_map);
   }
-  if (!is_rigid(keyframe.T_map_camera) || !keyframe.covariance.allFinite() || !is_distance(keyframe.travelled_m)) {
+  if (!is_rigid(keyframe.T_map_camera) || !keyframe.covariance.allFinite()) {
     return fmt::format("keyframe {}: its pose is not possible", id);
   }
   if (const std::string broken = broken_features(keyframe, header); !broken.empty()) {

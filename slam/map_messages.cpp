@@ -134,7 +134,6 @@ void fill_message(map_keyframe_t& message, KeyframeId id, const Keyframe& keyfra
   message.capture_mono_ns = keyframe.capture_ns;
   message.T_map_camera = to_message(keyframe.T_map_camera);
   Eigen::Map<RowMajor6d>(message.covariance) = keyframe.covariance;
-  message.travelled_m = keyframe.travelled_m;
   message.parent = static_cast<std::int64_t>(keyframe.parent);
   message.x.resize(n);
   message.y.resize(n);
@@ -162,7 +161,6 @@ Keyframe from_message(const map_keyframe_t& message, const PinholeCamera& camera
   keyframe.capture_ns = message.capture_mono_ns;
   keyframe.T_map_camera = from_message(message.T_map_camera);
   keyframe.covariance = Eigen::Map<const RowMajor6d>(message.covariance);
-  keyframe.travelled_m = message.travelled_m;
   keyframe.parent = static_cast<KeyframeId>(message.parent);
   const auto n = static_cast<std::size_t>(message.keypoints);
   keyframe.features.reserve(n);

@@ -7,6 +7,7 @@
 
 #include "core/clock.h"
 #include "core/logging.h"
+#include "slam/drift_model.h"
 #include "slam/dropped_keyframes.h"
 #include "slam/landmark_estimator.h"
 #include "slam/local_map.h"
@@ -41,8 +42,7 @@ Interrupt within(const Interrupt& interrupt, double budget_s) {
 
 struct Mapper::Impl {
   Impl(const TrackerConfig& tracker, const MapperConfig& mapper, MapMode map_mode, const CameraIntrinsics& intrinsics)
-      : pyramid_levels(tracker.pyramid_levels),
-        pyramid_scale(tracker.pyramid_scale),
+      : tracker_config(tracker),
         config(mapper),
         mode(map_mode),
         estimator(tracker, intrinsics),
@@ -70,8 +70,7 @@ struct Mapper::Impl {
   MapHeader header() const;
   Status load(const std::string& path);
 
-  int pyramid_levels;
-  double pyramid_scale;
+  TrackerConfig tracker_config;
   MapperConfig config;
   MapMode mode;
   Map map;
@@ -93,11 +92,13 @@ struct Mapper::Impl {
   RelocalizationAnswer relocalization;
   MapperCounters counters;
 
-  // What is left to do after the last keyframe.
-  bool extend_pending = false;
-  bool adjust_pending = false;
-  bool loop_pending = false;
-  bool full_pending = false;
+  /// What is left to do after the last keyframe, in this order.
+  struct Pending {
+    bool extend = false;  // landmarks from the neighbours
+    bool adjust = false;  // the neighbourhood
+    bool close_loop = false;
+    bool adjust_all = false;  // the whole map
+  } pending;
 };
 
 void Mapper::Impl::insert(const KeyframeRecord& record) {
@@ -135,52 +136,49 @@ void Mapper::Impl::begin_map(const KeyframeRecord& record) {
   newest = kNoKeyframe;
   newest_map_id = std::max(newest_map_id, record.map_id);
   T_map_odom = Se3();
-  full_pending = false;
+  pending.adjust_all = false;
 }
 
 void Mapper::Impl::insert_keyframe(const KeyframeRecord& record) {
   // The map may have been corrected, or joined with another, since the snapshot that the tracker used.
   KeyframeRecord moved = record;
-  const KeyframeId before = newest == kNoKeyframe ? centre : newest;
   moved.T_map_camera = T_map_odom * record.T_map_odom.inverse() * record.T_map_camera;
   if (!record.starts_map) {
-    moved.map_id = map.find_keyframe(before)->map_id;
+    moved.map_id = map.find_keyframe(newest)->map_id;
   }
   local.insert(moved);
-  Keyframe& keyframe = *map.find_keyframe(record.id);
-  if (const Keyframe* const previous = record.starts_map ? nullptr : map.find_keyframe(before)) {
-    keyframe.travelled_m =
-        previous->travelled_m + (keyframe.T_map_camera.translation() - previous->T_map_camera.translation()).norm();
-  }
   newest = record.id;
   centre = record.id;
   renew_anchor(record.covariance);
-  places.add(record.id, keyframe.features.descriptors);
+  places.add(record.id, record.features.descriptors);
   keep_budget();
-  extend_pending = true;
-  adjust_pending = config.bundle_keyframes > 0;
-  loop_pending = config.loop_closing;
+  pending.extend = true;
+  pending.adjust = config.bundle_keyframes > 0;
+  pending.close_loop = config.loop_closing;
 }
 
-/// A keyframe inherits the drift of the best keyframe that shares enough of its landmarks.
+/// A keyframe inherits the drift of the keyframe that leaves it least uncertain, of those that share enough of its landmarks.
 void Mapper::Impl::renew_anchor(const Matrix6d& given_map) {
   Keyframe& keyframe = *map.find_keyframe(newest);
   const auto seen =
       std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(), [](LandmarkId id) { return id != kNoLandmark; });
+  int most_shared = 0;
+  for (const auto& [id, shared] : keyframe.covisible) {
+    most_shared = std::max(most_shared, shared);
+  }
+  const double enough = std::min(kAnchorShare * static_cast<double>(seen), static_cast<double>(most_shared));
   anchor = newest;
+  keyframe.covariance = given_map + start_covariance();
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [id, shared] : keyframe.covisible) {
-    const double drift = map.find_keyframe(id)->covariance.trace();
-    if (shared >= kAnchorShare * static_cast<double>(seen) && drift < least) {
-      least = drift;
+    const Keyframe& other = *map.find_keyframe(id);
+    const Matrix6d covariance =
+        drifted_covariance(given_map, other.T_map_camera.inverse() * keyframe.T_map_camera, other.covariance);
+    if (shared >= enough && covariance.trace() < least) {
+      least = covariance.trace();
+      keyframe.covariance = covariance;
       anchor = id;
     }
-  }
-  keyframe.covariance = given_map;
-  if (anchor != newest) {
-    const Keyframe& a = *map.find_keyframe(anchor);
-    const Matrix6d to_camera = (keyframe.T_map_camera.inverse() * a.T_map_camera).adjoint();
-    keyframe.covariance += to_camera * a.covariance * to_camera.transpose();
   }
 }
 
@@ -222,14 +220,14 @@ bool Mapper::Impl::improve(const Interrupt& interrupt) {
   if (map.keyframes().empty() || mode == MapMode::Localization) {
     return false;
   }
-  if (std::exchange(extend_pending, false)) {
+  if (std::exchange(pending.extend, false)) {
     local.extend(newest, interrupt);
-  } else if (std::exchange(adjust_pending, false)) {
+  } else if (std::exchange(pending.adjust, false)) {
     adjust_locally(interrupt);
     cull();
-  } else if (std::exchange(loop_pending, false)) {
+  } else if (std::exchange(pending.close_loop, false)) {
     close_loop();
-  } else if (full_pending) {
+  } else if (pending.adjust_all) {
     adjust_all(interrupt);
     if (is_interrupted(interrupt)) {
       ++version;
@@ -265,8 +263,8 @@ void Mapper::Impl::close_loop() {
     T_map_odom = correction->T_corrected_previous * T_map_odom;
     log_info("{} at keyframe {} with keyframe {}: corrected by {:.3f} m", correction->joined_maps ? "maps joined" : "loop closed",
              correction->keyframe, correction->matched, correction->correction_m);
-    adjust_pending = config.bundle_keyframes > 0;
-    full_pending = adjust_pending;
+    pending.adjust = config.bundle_keyframes > 0;
+    pending.adjust_all = pending.adjust;
   }
 }
 
@@ -274,7 +272,7 @@ void Mapper::Impl::adjust_all(const Interrupt& interrupt) {
   const Se3 before = map.find_keyframe(newest)->T_map_camera;
   const BundleSummary summary = local.adjuster().adjust_all(map, map.find_keyframe(newest)->map_id, kFullIterations, interrupt);
   follow_newest(before);
-  full_pending = summary.outcome == BundleOutcome::Interrupted;
+  pending.adjust_all = summary.outcome == BundleOutcome::Interrupted;
 }
 
 void Mapper::Impl::cull() {
@@ -328,8 +326,8 @@ void Mapper::Impl::write_snapshot(MapSnapshot& snapshot) const {
 MapHeader Mapper::Impl::header() const {
   MapHeader h;
   h.camera = estimator.camera().intrinsics();
-  h.pyramid_levels = pyramid_levels;
-  h.pyramid_scale = pyramid_scale;
+  h.pyramid_levels = tracker_config.pyramid_levels;
+  h.pyramid_scale = tracker_config.pyramid_scale;
   h.active_map = centre == kNoKeyframe ? 0 : map.find_keyframe(centre)->map_id;
   h.highest_map = newest_map_id;
   h.saved_utc_ns = SystemClock::instance().utc_ns(SystemClock::instance().now_ns());

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/clock.h"
+#include "slam/drift_model.h"
 #include "slam/feature_frame.h"
 #include "slam/frame_localizer.h"
 #include "slam/keyframe_recovery.h"
@@ -18,7 +19,7 @@ constexpr int kMinDepthsToInitialize = 100;  // keypoints with depth that a firs
 constexpr float kPredictedRadius = 10.0F;    // [pixels on level 0] around last frame's landmarks where the motion model puts them
 constexpr float kWideRadius = 30.0F;         // the same when that finds too little
 constexpr int kFewMatches = 40;
-constexpr KeyframeId kYoungMapKeyframes = 5;  // a map that is lost before it has as many is not worth finding again
+constexpr KeyframeId kYoungMapKeyframes = 5;  // the only map is not worth finding again where it is lost before it has as many
 constexpr int kRecoveriesPerFrame = 2;        // keyframes tried a frame, so that a lost tracker stays in its time
 constexpr int kMinRecoveryInliers = 15;
 constexpr int kCloseTracked = 100;   // fewer close landmarks tracked and...
@@ -37,6 +38,7 @@ struct Tracker::Impl {
   PoseEstimate track(const RgbdFrame& rgbd, const MapSnapshot& map, KeyframeRecord* candidate);
   void adopt(const MapSnapshot& map);
   bool can_initialize() const;
+  bool is_young() const { return last_keyframe - map_begin < kYoungMapKeyframes; }
   bool wants_map(const MapSnapshot& map, TimeNs elapsed_ns);
   void initialize(const MapSnapshot& map);
   void find_camera(const MapSnapshot& map);
@@ -65,7 +67,7 @@ struct Tracker::Impl {
   // This frame.
   FeatureFrame frame;
   std::uint64_t sequence = 0;
-  std::int64_t stamp_utc_ns = 0;
+  std::int64_t stamp_utc_ns = 0;  // 0: no frame yet
   bool starts_map = false;
   Se3 T_map_odom;
   Timing timing;
@@ -77,6 +79,7 @@ struct Tracker::Impl {
   int frames_since_keyframe = 0;
   int reference_inliers = 0;  // best seen since the mapper took the last keyframe in
   bool has_map = false;
+  bool has_old_map = false;  // besides the present one: the camera may be found there
   std::uint32_t map_id = 0;
   std::uint32_t newest_map_id = 0;
   KeyframeId map_begin = kNoKeyframe;  // last keyframe before the map began
@@ -103,6 +106,7 @@ Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, Ma
 /// A map that was there before the first frame, loaded from a file, is searched before a new one is begun.
 void Tracker::Impl::adopt(const MapSnapshot& map) {
   has_map = true;
+  has_old_map = true;
   last_keyframe = map.newest_keyframe;
   state = TrackingState::Relocalizing;
 }
@@ -123,13 +127,14 @@ bool Tracker::Impl::wants_map(const MapSnapshot& map, TimeNs elapsed_ns) {
     return false;  // one is being begun
   }
   searched_ns += elapsed_ns;
-  return last_keyframe - map_begin < kYoungMapKeyframes || to_seconds(searched_ns) > config.new_map_after_s;
+  return (is_young() && !has_old_map) || to_seconds(searched_ns) > config.new_map_after_s;
 }
 
 /// The first keyframe of a map defines it. Later maps begin where the camera was seen last, so that odom goes on.
 void Tracker::Impl::initialize(const MapSnapshot& map) {
   newest_map_id = std::max(newest_map_id, map.newest_map_id) + 1;
   map_id = newest_map_id;
+  has_old_map = has_old_map || (has_map && !is_young());
   map_begin = last_keyframe;
   has_map = true;
   starts_map = true;
@@ -240,13 +245,13 @@ bool Tracker::Impl::may_ask(const MapSnapshot& map) const {
   return has_map && map.version > 0 && state != TrackingState::Initializing && !waiting && can_initialize();
 }
 
-/// What the landmarks' own error, which they share with the keyframe they hang on, adds to the error given them.
+/// The solver's covariance takes the landmarks as exact; their own error is that of the keyframe they hang on.
 Matrix6d Tracker::Impl::covariance_with_drift(const MapSnapshot& map) const {
   if (starts_map) {
-    return localizer.solution().covariance;
+    return start_covariance();
   }
-  const Matrix6d to_camera = (localizer.solution().T_map_camera.inverse() * map.T_map_anchor).adjoint();
-  return localizer.solution().covariance + to_camera * map.anchor_covariance * to_camera.transpose();
+  const PoseSolution& solution = localizer.solution();
+  return drifted_covariance(solution.covariance, map.T_map_anchor.inverse() * solution.T_map_camera, map.anchor_covariance);
 }
 
 /// Keeps what the next frame is predicted from.
@@ -295,7 +300,8 @@ void Tracker::Impl::find_camera(const MapSnapshot& map) {
 PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map, KeyframeRecord* candidate) {
   const TimeNs begin_ns = now_ns();
   timing = Timing{};
-  const TimeNs elapsed_ns = std::max<TimeNs>(0, rgbd.stamp_utc_ns - stamp_utc_ns);
+  // Before the first frame no time has passed: a loaded map is searched for as long as any other.
+  const TimeNs elapsed_ns = stamp_utc_ns == 0 ? 0 : std::max<TimeNs>(0, rgbd.stamp_utc_ns - stamp_utc_ns);
   sequence = rgbd.sequence;
   stamp_utc_ns = rgbd.stamp_utc_ns;
   extractor.extract(rgbd.gray, frame.features());

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "config/config.h"
 #include "core/pinhole_camera.h"
 #include "core/se3.h"
+#include "slam/descriptor.h"
 #include "slam/feature_frame.h"
 #include "slam/keyframe_record.h"
 
@@ -35,6 +37,28 @@ class FeatureWorld {
     }
   }
 
+  /// A world of the given points.
+  FeatureWorld(unsigned seed, std::vector<Eigen::Vector3d> points) : generator_(seed), points_(std::move(points)) {
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      descriptors_.push_back(random_descriptor());
+    }
+  }
+
+  /// Once more all that is there, displaced: places that look the same.
+  void repeat(const Eigen::Vector3d& displacement) {
+    const std::size_t count = points_.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      points_.push_back(points_[i] + displacement);
+      descriptors_.push_back(descriptors_[i]);
+    }
+  }
+
+  /// Another point, which looks like no other.
+  void add(const Eigen::Vector3d& point) {
+    points_.push_back(point);
+    descriptors_.push_back(random_descriptor());
+  }
+
   /// Features from `T_map_camera`: pixel noise of `pixel_sigma`, depth noise of `depth_sigma_m`, `flips` random bits of each
   /// descriptor.
   View view(const Se3& T_map_camera, double pixel_sigma = 0, double depth_sigma_m = 0, int flips = 10) {
@@ -46,7 +70,7 @@ class FeatureWorld {
     const Se3 T_camera_map = T_map_camera.inverse();
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Eigen::Vector3d p = T_camera_map * points_[i];
-      if (p.z() < 0.3) {
+      if (p.z() < 0.3 || p.z() > range_m) {
         continue;
       }
       const Eigen::Vector2d pixel = camera.project(p) + pixel_sigma * Eigen::Vector2d(normal(generator_), normal(generator_));
@@ -103,6 +127,7 @@ class FeatureWorld {
   std::size_t point_of(const Descriptor& descriptor) const;
 
   CameraIntrinsics intrinsics;
+  double range_m = 20;  ///< how far the camera sees, in place of walls
 
  private:
   Descriptor random_descriptor() { return {generator_(), generator_(), generator_(), generator_()}; }
@@ -113,19 +138,10 @@ class FeatureWorld {
 };
 
 inline std::size_t FeatureWorld::point_of(const Descriptor& descriptor) const {
-  std::size_t best = 0;
-  int least = 257;
-  for (std::size_t i = 0; i < descriptors_.size(); ++i) {
-    int distance = 0;
-    for (std::size_t w = 0; w < descriptor.size(); ++w) {
-      distance += __builtin_popcountll(descriptor[w] ^ descriptors_[i][w]);
-    }
-    if (distance < least) {
-      least = distance;
-      best = i;
-    }
-  }
-  return best;
+  const auto nearest = std::min_element(descriptors_.begin(), descriptors_.end(), [&](const Descriptor& a, const Descriptor& b) {
+    return hamming_distance(a, descriptor) < hamming_distance(b, descriptor);
+  });
+  return static_cast<std::size_t>(nearest - descriptors_.begin());
 }
 
 }  // namespace posed

@@ -86,7 +86,6 @@ class RandomMap {
       record.depth_m.push_back(index(4) == 0 ? 0.0F : static_cast<float>(uniform(0.5, 5)));
     }
     Keyframe& keyframe = map_.add_keyframe(record);
-    keyframe.travelled_m = uniform(0, 100);
     keyframe.parent = id > 2 ? id - 2 : kNoKeyframe;  // of the same map
     std::vector<LandmarkId>& known = landmarks_[map_id];
     for (std::size_t i = 0; i < keypoints; ++i) {

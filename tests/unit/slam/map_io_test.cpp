@@ -61,7 +61,6 @@ void expect_same(const Keyframe& a, const Keyframe& b) {
   EXPECT_EQ(a.capture_ns, b.capture_ns);
   EXPECT_TRUE(same_pose(a.T_map_camera, b.T_map_camera));
   EXPECT_EQ(a.covariance, b.covariance);
-  EXPECT_EQ(a.travelled_m, b.travelled_m);
   EXPECT_TRUE(std::equal(a.features.keypoints.begin(), a.features.keypoints.end(), b.features.keypoints.begin(),
                          b.features.keypoints.end(), same_keypoint));
   EXPECT_EQ(a.features.descriptors, b.features.descriptors);

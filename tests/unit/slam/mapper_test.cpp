@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "slam/drift_model.h"
 #include "tests/support/feature_world.h"
+#include "tests/support/temporary_folder.h"
 
 namespace posed {
 namespace {
@@ -148,6 +150,157 @@ TEST_F(MapperTest, ANewMapReplacesAYoungOneButKeepsItsPoses) {
   EXPECT_GT(s.landmarks.front().id, old_map.landmarks.back().id) << "an old landmark's id must not mean a new one";
   ASSERT_TRUE(mapper.keyframe_pose(1));
   EXPECT_LT((mapper.keyframe_pose(1)->inverse() * shifted(0.5)).log().norm(), 1e-9);
+}
+
+/// Whatever is left to do, without interruption.
+void finish(Mapper& mapper) {
+  while (mapper.improve({})) {
+  }
+}
+
+TEST_F(MapperTest, ImprovesUntilNothingIsLeft) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  EXPECT_FALSE(mapper.improve({})) << "an empty map cannot be improved";
+  for (KeyframeId id = 1; id <= 6; ++id) {
+    const auto view = world.view(shifted(0.1 * static_cast<double>(id)), 1.0, 0.02);
+    mapper.insert(FeatureWorld::record(view, id, landmarks_by_point(snapshot_of(mapper))));
+    const std::uint64_t version = snapshot_of(mapper).version;
+    finish(mapper);
+    EXPECT_GT(snapshot_of(mapper).version, version);
+    EXPECT_FALSE(mapper.improve({}));
+  }
+  EXPECT_EQ(mapper.counters().adjustments, 6U);
+  EXPECT_EQ(mapper.counters().adjustments_given_up, 0U);
+  EXPECT_LT(mean_error_m(snapshot_of(mapper)), 0.02);
+}
+
+TEST_F(MapperTest, AdjustmentBringsKeyframesNearerToTheTruth) {
+  double before = 0;
+  double after = 0;
+  for (const bool adjusted : {false, true}) {
+    config.bundle_keyframes = adjusted ? 20 : 0;
+    Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+    double sum = 0;
+    for (KeyframeId id = 1; id <= 8; ++id) {
+      const Se3 truth = shifted(0.15 * static_cast<double>(id - 1));
+      KeyframeRecord record = FeatureWorld::record(world.view(truth, 1.0, 0.01), id, landmarks_by_point(snapshot_of(mapper)));
+      const Se3 error = Se3::exp(0.004 * Vector6d::Ones() * (id % 2 == 0 ? 1 : -1));
+      record.T_map_camera = id == 1 ? truth : truth * error;
+      record.T_map_odom = snapshot_of(mapper).T_map_odom;
+      mapper.insert(record);
+      finish(mapper);
+    }
+    for (KeyframeId id = 1; id <= 8; ++id) {
+      sum += (mapper.keyframe_pose(id)->inverse() * shifted(0.15 * static_cast<double>(id - 1))).log().norm();
+    }
+    (adjusted ? after : before) = sum;
+  }
+  EXPECT_LT(after, 0.5 * before);
+}
+
+TEST_F(MapperTest, WhatIsInterruptedIsGivenUpAndTheMapStaysSound) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  for (KeyframeId id = 1; id <= 6; ++id) {
+    const auto view = world.view(shifted(0.1 * static_cast<double>(id)), 1.0, 0.02);
+    mapper.insert(FeatureWorld::record(view, id, landmarks_by_point(snapshot_of(mapper))));
+    while (mapper.improve([] { return true; })) {
+    }
+  }
+  EXPECT_EQ(mapper.counters().adjustments_given_up, 6U);
+  for (KeyframeId id = 1; id <= 6; ++id) {
+    ASSERT_TRUE(mapper.keyframe_pose(id)) << id;
+    EXPECT_LT((mapper.keyframe_pose(id)->inverse() * shifted(0.1 * static_cast<double>(id))).log().norm(), 0.05) << id;
+  }
+  EXPECT_LT(mean_error_m(snapshot_of(mapper)), 0.05);
+}
+
+TEST_F(MapperTest, CorrectionsOfTheMapDoNotShowInOdom) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  for (KeyframeId id = 1; id <= 6; ++id) {
+    KeyframeRecord record = FeatureWorld::record(world.view(shifted(0.1 * static_cast<double>(id)), 1.0, 0.02), id,
+                                                 landmarks_by_point(snapshot_of(mapper)));
+    record.T_map_odom = snapshot_of(mapper).T_map_odom;
+    record.T_map_camera = record.T_map_odom * record.T_map_camera;
+    mapper.insert(record);
+    const auto in_odom = [&] { return snapshot_of(mapper).T_map_odom.inverse() * *mapper.keyframe_pose(id); };
+    const Se3 before = in_odom();
+    finish(mapper);
+    EXPECT_LT((before.inverse() * in_odom()).log().norm(), 1e-9);
+  }
+  EXPECT_GT(snapshot_of(mapper).T_map_odom.log().norm(), 0.0) << "nothing was corrected, so nothing was tested";
+}
+
+TEST_F(MapperTest, AKeyframeFollowsWhatWasCorrectedSinceItWasTracked) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  mapper.insert(FeatureWorld::record(world.view(Se3()), 1, {}));
+  const Se3 pose = shifted(0.1);
+  KeyframeRecord record = FeatureWorld::record(world.view(pose), 2, landmarks_by_point(snapshot_of(mapper)));
+  record.T_map_odom = shifted(0.7, 0.3);  // of the snapshot it was tracked against; the mapper's own is the identity by now
+  record.T_map_camera = record.T_map_odom * pose;
+  mapper.insert(record);
+  EXPECT_LT((mapper.keyframe_pose(2)->inverse() * pose).log().norm(), 1e-9);
+}
+
+TEST_F(MapperTest, SavedMapsComeBackAndInLocalizationStayAsTheyAre) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "map";
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  for (KeyframeId id = 1; id <= 6; ++id) {
+    const auto view = world.view(shifted(0.1 * static_cast<double>(id)));
+    mapper.insert(FeatureWorld::record(view, id, landmarks_by_point(snapshot_of(mapper))));
+  }
+  ASSERT_TRUE(mapper.save(file));
+
+  Mapper loaded(tracker, config, MapMode::Localization, world.intrinsics);
+  ASSERT_TRUE(loaded.load(file));
+  EXPECT_EQ(loaded.keyframe_count(), mapper.keyframe_count());
+  EXPECT_EQ(loaded.landmark_count(), mapper.landmark_count());
+  const MapSnapshot s = snapshot_of(loaded);
+  EXPECT_EQ(s.map_id, 1U);
+  EXPECT_EQ(s.newest_keyframe, 6U) << "numbers go on";
+  EXPECT_EQ(s.landmarks.size(), snapshot_of(mapper).landmarks.size());
+
+  loaded.insert(FeatureWorld::record(world.view(shifted(0.1)), 7, landmarks_by_point(s)));
+  EXPECT_FALSE(loaded.improve({}));
+  EXPECT_EQ(loaded.keyframe_count(), mapper.keyframe_count());
+  EXPECT_EQ(loaded.landmark_count(), mapper.landmark_count());
+  EXPECT_EQ(snapshot_of(loaded).newest_keyframe, 7U) << "the tracker must not wait for it";
+  EXPECT_EQ(snapshot_of(loaded).keyframes.front().id, 1U) << "the local map follows the camera";
+}
+
+TEST_F(MapperTest, AFileThatCannotBeLoadedChangesNothing) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  EXPECT_FALSE(mapper.load("/nowhere/map"));
+  EXPECT_EQ(snapshot_of(mapper).version, 0U);
+  mapper.insert(FeatureWorld::record(world.view(Se3()), 1, {}));
+  EXPECT_EQ(mapper.keyframe_count(), 1U);
+}
+
+TEST_F(MapperTest, UncertaintyGrowsOnTheWayOutAndShrinksOnTheWayBack) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  // Along x, so far that the last view shows nothing of the first, and back.
+  constexpr int kSteps = 12;
+  constexpr double kStep_m = 0.3;
+  std::vector<double> variances_m2;
+  for (int i = 0; i <= 2 * kSteps; ++i) {
+    const Se3 T_map_camera = shifted(-1.8 + kStep_m * (i <= kSteps ? i : 2 * kSteps - i));
+    const auto known = landmarks_by_point(snapshot_of(mapper));
+    KeyframeRecord record = FeatureWorld::record(world.view(T_map_camera), static_cast<KeyframeId>(i) + 1, known);
+    record.covariance = i == 0 ? Matrix6d::Zero() : isotropic_covariance(1e-8, 1e-8);
+    mapper.insert(record);
+    const MapSnapshot s = snapshot_of(mapper);
+    const Matrix6d covariance = drifted_covariance(record.covariance, s.T_map_anchor.inverse() * T_map_camera, s.anchor_covariance);
+    variances_m2.push_back(covariance.bottomRightCorner<3, 3>().trace());
+  }
+  const double out_m2 = variances_m2[kSteps];
+  for (int i = 4; i <= kSteps; i += 4) {
+    EXPECT_GT(variances_m2[static_cast<std::size_t>(i)], 1.2 * variances_m2[static_cast<std::size_t>(i) - 4]) << i;
+  }
+  // At least what a random walk over the way makes.
+  EXPECT_GE(out_m2, 3 * kSteps * kStep_m * DriftRates{}.sigma_m * DriftRates{}.sigma_m);
+  for (int i = 0; i <= kSteps; i += 4) {
+    EXPECT_LT(variances_m2[static_cast<std::size_t>(2 * kSteps - i)], 1.5 * variances_m2[static_cast<std::size_t>(i)] + 1e-6) << i;
+  }
 }
 
 TEST_F(MapperTest, SnapshotOfAnEmptyMapSaysSo) {

@@ -1,93 +1,18 @@
 #include "slam/tracker.h"
 
 #include <cmath>
-#include <optional>
-#include <vector>
 
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
-#include "config/config_loader.h"
-#include "core/frame_pool.h"
-#include "core/rigid_alignment.h"
-#include "drivers/synthetic_camera.h"
-#include "slam/mapper.h"
+#include "slam/drift_model.h"
+#include "tests/support/slam_rig.h"
 
 namespace posed {
 namespace {
 
-enum class Mapping {
-  AtOnce,  ///< lockstep: the mapper takes a keyframe in before the next frame
-  Never,   ///< the mapper is always behind: there is no room for a keyframe
-};
-
-/// Tracker and mapper taking turns over the synthetic world without people.
-class Rig {
- public:
-  explicit Rig(std::int64_t seed = 1) {
-    SyntheticConfig synthetic;
-    synthetic.people = 0;
-    synthetic.seed = seed;
-    const Result<Config> defaults = default_config();
-    config_ = defaults.value();
-    camera_ = std::move(SyntheticCamera::create(synthetic, config_.intrinsics).value());
-    pool_.emplace(config_.intrinsics.width, config_.intrinsics.height, 1);
-    tracker_.emplace(config_.tracker, config_.mapper, MapMode::Mapping, config_.intrinsics, Se3());
-    mapper_.emplace(config_.tracker, config_.mapper, MapMode::Mapping, config_.intrinsics);
-  }
-
-  /// Frame `index` of the world, changed by `spoil`.
-  template <typename Spoil>
-  PoseEstimate track(std::uint64_t index, Spoil spoil, Mapping mapping = Mapping::AtOnce) {
-    FrameWriter frame = *pool_->acquire();
-    EXPECT_TRUE(camera_->render(index, *frame));
-    spoil(*frame);
-    const PoseEstimate estimate = tracker_->track(*frame, snapshot_, mapping == Mapping::Never ? nullptr : &record_);
-    if (estimate.keyframe || estimate.asks_where) {
-      mapper_->insert(record_);
-      while (mapper_->improve({})) {
-      }
-      mapper_->write_snapshot(snapshot_);
-    }
-    return estimate;
-  }
-  PoseEstimate track(std::uint64_t index, Mapping mapping = Mapping::AtOnce) {
-    return track(
-        index, [](RgbdFrame&) {}, mapping);
-  }
-
-  /// Distance [m] between the estimate and the truth, with the first camera as the map's frame.
-  double error_m(std::uint64_t index, const PoseEstimate& estimate) const {
-    const Se3 truth = camera_->pose(0).inverse() * camera_->pose(index);
-    return (estimate.T_map_camera().translation() - truth.translation()).norm();
-  }
-
-  const Mapper& mapper() const { return *mapper_; }
-
- private:
-  Config config_;
-  std::unique_ptr<SyntheticCamera> camera_;
-  std::optional<FramePool> pool_;
-  std::optional<Tracker> tracker_;
-  std::optional<Mapper> mapper_;
-  MapSnapshot snapshot_;
-  KeyframeRecord record_;
-};
-
-void blacken(RgbdFrame& frame) {
-  for (int y = 0; y < frame.gray.height; ++y) {
-    std::fill_n(frame.gray.row(y), frame.gray.width, std::uint8_t{0});
-    std::fill_n(frame.depth_m.row(y), frame.depth_m.width, 0.0F);
-  }
-}
-
-void take_depth_away(RgbdFrame& frame) {
-  for (int y = 0; y < frame.depth_m.height; ++y) {
-    std::fill_n(frame.depth_m.row(y), frame.depth_m.width, 0.0F);
-  }
-}
-
 TEST(Tracker, FollowsTheCameraThroughTheRoom) {
-  Rig rig;
+  SlamRig rig;
   double squared = 0;
   constexpr std::uint64_t kFrames = 90;
   for (std::uint64_t i = 0; i < kFrames; ++i) {
@@ -103,13 +28,11 @@ TEST(Tracker, FollowsTheCameraThroughTheRoom) {
 }
 
 TEST(Tracker, StartsAtTheConfiguredPoseAndSaysHowSureItIs) {
-  const Result<Config> config = default_config();
-  ASSERT_TRUE(config);
-  Rig rig;
+  SlamRig rig;
   const PoseEstimate first = rig.track(0);
   EXPECT_TRUE(first.keyframe);
   EXPECT_EQ(first.T_map_camera().translation(), Eigen::Vector3d::Zero());
-  EXPECT_TRUE(first.covariance.isZero()) << "the first frame defines the map";
+  EXPECT_EQ(first.covariance, start_covariance()) << "the first frame defines the map, as well as it measures";
   const PoseEstimate second = rig.track(1);
   ASSERT_TRUE(second.has_pose());
   EXPECT_GT(second.covariance.diagonal().minCoeff(), 0.0);
@@ -117,9 +40,33 @@ TEST(Tracker, StartsAtTheConfiguredPoseAndSaysHowSureItIs) {
   EXPECT_LT((second.covariance - second.covariance.transpose()).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+// One run is one draw of a slowly varying error, so this holds the order of magnitude; consistency_bench asks many runs.
+TEST(Tracker, ItsErrorsAreWhatItsCovarianceSays) {
+  SlamRig rig(rig_config(SyntheticWorldKind::Room, 2));
+  int frames = 0;
+  int in_band = 0;
+  double last_trace = 0;
+  for (std::uint64_t i = 0; i < 240; i += 3) {
+    const PoseEstimate estimate = rig.track(i);
+    ASSERT_TRUE(estimate.has_pose()) << i;
+    const Eigen::LLT<Matrix6d> factor(estimate.covariance);
+    ASSERT_EQ(factor.info(), Eigen::Success) << "frame " << i << ": filters need a positive definite matrix";
+    ASSERT_LT((estimate.covariance - estimate.covariance.transpose()).cwiseAbs().maxCoeff(), 1e-15);
+    if (i > 0) {
+      const Vector6d xi = (estimate.T_map_camera().inverse() * rig.true_pose_in_map(i)).log();
+      const double nees = xi.dot(factor.solve(xi));
+      ++frames;
+      in_band += nees > 1.237 && nees < 14.449 ? 1 : 0;  // 95 % of chi-squared with 6 degrees of freedom
+    }
+    last_trace = estimate.covariance.trace();
+  }
+  EXPECT_GE(in_band, 0.8 * frames);
+  EXPECT_GT(last_trace, 2 * start_covariance().trace()) << "it is no longer where it began";
+}
+
 TEST(Tracker, GivesTheSameBitsTwice) {
-  Rig a;
-  Rig b;
+  SlamRig a;
+  SlamRig b;
   for (std::uint64_t i = 0; i < 30; ++i) {
     const PoseEstimate first = a.track(i);
     const PoseEstimate second = b.track(i);
@@ -131,14 +78,14 @@ TEST(Tracker, GivesTheSameBitsTwice) {
 }
 
 TEST(Tracker, IsLostInTheDarkAndFindsBack) {
-  Rig rig;
+  SlamRig rig;
   std::uint64_t i = 0;
   for (; i < 60; ++i) {
     ASSERT_TRUE(rig.track(i).has_pose()) << i;
   }
   ASSERT_GE(rig.mapper().keyframe_count(), 5U) << "a younger map would be begun anew";
   for (const std::uint64_t covered_until = i + 15; i < covered_until; ++i) {
-    const PoseEstimate estimate = rig.track(i, blacken);
+    const PoseEstimate estimate = rig.track(i, cover_camera);
     EXPECT_EQ(estimate.state, i == 60 ? TrackingState::Lost : TrackingState::Relocalizing);
     EXPECT_FALSE(estimate.has_pose());
     EXPECT_FALSE(estimate.keyframe);
@@ -157,7 +104,7 @@ TEST(Tracker, IsLostInTheDarkAndFindsBack) {
 }
 
 TEST(Tracker, WaitsForDepthBeforeItBegins) {
-  Rig rig;
+  SlamRig rig;
   for (std::uint64_t i = 0; i < 3; ++i) {
     const PoseEstimate estimate = rig.track(i, take_depth_away);
     EXPECT_EQ(estimate.state, TrackingState::Initializing);
@@ -167,7 +114,7 @@ TEST(Tracker, WaitsForDepthBeforeItBegins) {
 }
 
 TEST(Tracker, TracksAFewFramesWithoutDepth) {
-  Rig rig;
+  SlamRig rig;
   for (std::uint64_t i = 0; i < 20; ++i) {
     const PoseEstimate estimate = i % 4 == 3 ? rig.track(i, take_depth_away) : rig.track(i);
     ASSERT_TRUE(estimate.has_pose()) << i;
@@ -176,25 +123,25 @@ TEST(Tracker, TracksAFewFramesWithoutDepth) {
 }
 
 TEST(Tracker, DoesNotBeginWithoutRoomForTheKeyframe) {
-  Rig rig;
-  EXPECT_EQ(rig.track(0, Mapping::Never).state, TrackingState::Initializing);
+  SlamRig rig;
+  EXPECT_EQ(rig.track(0, SlamRig::Mapping::Never).state, TrackingState::Initializing);
   EXPECT_EQ(rig.track(1).state, TrackingState::Tracking);
 }
 
 TEST(Tracker, GoesOnWithoutKeyframesWhileTheMapperIsBehind) {
-  Rig rig;
+  SlamRig rig;
   ASSERT_TRUE(rig.track(0).keyframe);
   for (std::uint64_t i = 1; i < 15; ++i) {
-    const PoseEstimate estimate = rig.track(i, Mapping::Never);
+    const PoseEstimate estimate = rig.track(i, SlamRig::Mapping::Never);
     EXPECT_TRUE(estimate.has_pose()) << i;
     EXPECT_FALSE(estimate.keyframe);
   }
 }
 
 TEST(Tracker, BeginsANewMapWhenAYoungOneIsLost) {
-  Rig rig;
+  SlamRig rig;
   ASSERT_TRUE(rig.track(0).has_pose());
-  EXPECT_EQ(rig.track(1, blacken).state, TrackingState::Lost) << "nothing can be begun in the dark";
+  EXPECT_EQ(rig.track(1, cover_camera).state, TrackingState::Lost) << "nothing can be begun in the dark";
   constexpr std::uint64_t kElsewhere = 900;
   const PoseEstimate again = rig.track(kElsewhere);
   EXPECT_TRUE(again.has_pose());
