@@ -194,6 +194,10 @@ const Keyframe* Map::find_keyframe(KeyframeId id) const {
   return it == keyframes_.end() ? nullptr : &it->second;
 }
 
+bool Map::has_map(std::uint32_t map_id) const {
+  return std::any_of(keyframes_.begin(), keyframes_.end(), [map_id](const auto& entry) { return entry.second.map_id == map_id; });
+}
+
 int Map::keypoint_of(const Landmark& landmark, KeyframeId keyframe) {
   for (const Observation& o : landmark.observations) {
     if (o.keyframe == keyframe) {

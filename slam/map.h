@@ -95,6 +95,9 @@ class Map {
   Keyframe* find_keyframe(KeyframeId id);
   const Keyframe* find_keyframe(KeyframeId id) const;
 
+  /// Whether any keyframe belongs to it.
+  bool has_map(std::uint32_t map_id) const;
+
   /// Index of the keypoint by which `keyframe` sees the landmark, or -1.
   static int keypoint_of(const Landmark& landmark, KeyframeId keyframe);
 

@@ -143,8 +143,8 @@ void Mapper::Impl::insert_keyframe(const KeyframeRecord& record) {
   // The map may have been corrected, or joined with another, since the snapshot that the tracker used.
   KeyframeRecord moved = record;
   moved.T_map_camera = T_map_odom * record.T_map_odom.inverse() * record.T_map_camera;
-  if (!record.starts_map) {
-    moved.map_id = map.find_keyframe(newest)->map_id;
+  if (!record.starts_map && !map.has_map(record.map_id)) {
+    moved.map_id = map.find_keyframe(newest)->map_id;  // its map was joined with another
   }
   local.insert(moved);
   newest = record.id;

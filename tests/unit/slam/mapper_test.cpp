@@ -268,6 +268,38 @@ TEST_F(MapperTest, SavedMapsComeBackAndInLocalizationStayAsTheyAre) {
   EXPECT_EQ(snapshot_of(loaded).keyframes.front().id, 1U) << "the local map follows the camera";
 }
 
+TEST_F(MapperTest, AKeyframeOfOneMapStaysThereThoughTheCameraWasFoundInAnother) {
+  Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+  FeatureWorld elsewhere(2);
+  KeyframeId id = 0;
+  const auto insert = [&](FeatureWorld& place, std::uint32_t map_id, double x) {
+    KeyframeRecord record = FeatureWorld::record(place.view(shifted(x)), ++id, {});
+    record.map_id = map_id;
+    record.starts_map = snapshot_of(mapper).newest_map_id < map_id;
+    mapper.insert(record);
+  };
+  for (int i = 0; i < 6; ++i) {
+    insert(world, 1, 0.1 * i);
+  }
+  for (int i = 0; i < 6; ++i) {
+    insert(elsewhere, 2, 0.1 * i);
+  }
+  ASSERT_EQ(snapshot_of(mapper).map_id, 2U);
+
+  // The tracker asks where it is, and finds its way back in map 2 before it learns of the answer.
+  KeyframeRecord question = FeatureWorld::record(world.view(shifted(0.2)), kNoKeyframe, {});
+  question.purpose = RecordPurpose::Relocalization;
+  question.sequence = 77;
+  mapper.insert(question);
+  ASSERT_TRUE(snapshot_of(mapper).relocalization.found);
+  EXPECT_EQ(snapshot_of(mapper).relocalization.sequence, 77U);
+  EXPECT_LT((snapshot_of(mapper).relocalization.T_map_camera.inverse() * shifted(0.2)).log().norm(), 1e-2);
+  EXPECT_EQ(snapshot_of(mapper).map_id, 1U);
+
+  insert(elsewhere, 2, 0.7);
+  EXPECT_EQ(snapshot_of(mapper).map_id, 2U);
+}
+
 TEST_F(MapperTest, AFileThatCannotBeLoadedChangesNothing) {
   Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   EXPECT_FALSE(mapper.load("/nowhere/map"));
