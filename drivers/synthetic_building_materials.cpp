@@ -58,10 +58,7 @@ MipTexture paint_vinyl_floor(float width_m, float height_m, std::span<const Floo
     const float opacity = rng.uniform(0.35F, 0.85F);
     any_shape(painter, rng, centre, size, from_hue(hue + 0.05F, 0.2F, brightness), opacity);
   }
-  for (const FloorShadow& shadow : shadows) {
-    painter.shadow(shadow.centre, shadow.half, shadow.angle_rad, 0.18F, 0.45F);
-  }
-  painter.darken_border(0.4F, 0.3F);
+  shade_floor(painter, shadows);
   return std::move(painter).finish();
 }
 

@@ -151,10 +151,7 @@ MipTexture paint_floor(float width_m, float height_m, std::span<const FloorShado
     any_shape(painter, rng, middle + Eigen::Vector2f(across * rug.x(), along * rug.y()), size, colour, 0.8F);
   }
   painter.mottle(rng.next(), 0.12F, 0.12F, 0.22F, 4);
-  for (const FloorShadow& shadow : shadows) {
-    painter.shadow(shadow.centre, shadow.half, shadow.angle_rad, 0.18F, 0.45F);
-  }
-  painter.darken_border(0.4F, 0.3F);
+  shade_floor(painter, shadows);
   return std::move(painter).finish();
 }
 

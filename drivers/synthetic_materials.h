@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "drivers/synthetic_motifs.h"
 #include "drivers/synthetic_texture.h"
 
 /// The synthetic worlds' surfaces, painted from integer hashes: rich in corners of every size that a camera resolves at 0.6 to 5 m,
@@ -16,13 +17,6 @@ MipTexture paint_wall(float width_m, float height_m, std::uint32_t seed);
 
 /// Something to hang on a wall: an abstract, a page of print, a mosaic or a landscape.
 MipTexture paint_poster(float width_m, float height_m, std::uint32_t seed);
-
-/// Something that stands on the floor and takes the light there; metres on the floor's texture, angle from x towards y.
-struct FloorShadow {
-  Eigen::Vector2f centre;
-  Eigen::Vector2f half;
-  float angle_rad = 0;
-};
 
 /// Carpet of irregular tiles with a patterned rug in the middle.
 MipTexture paint_floor(float width_m, float height_m, std::span<const FloorShadow> shadows, std::uint32_t seed);

@@ -77,6 +77,13 @@ int count_for(const TexturePainter& painter, float per_square_metre) {
   return static_cast<int>(painter.width_m() * painter.height_m() * per_square_metre);
 }
 
+void shade_floor(TexturePainter& painter, std::span<const FloorShadow> shadows) {
+  for (const FloorShadow& shadow : shadows) {
+    painter.shadow(shadow.centre, shadow.half, shadow.angle_rad, 0.18F, 0.45F);
+  }
+  painter.darken_border(0.4F, 0.3F);
+}
+
 void frame_border(TexturePainter& painter, float width, Colour colour) {
   const float w = painter.width_m();
   const float h = painter.height_m();

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include <Eigen/Core>
 
 #include "drivers/synthetic_hash.h"
@@ -36,6 +38,16 @@ void print_text(TexturePainter& painter, HashRng& rng, Eigen::Vector2f origin, E
 
 /// How many there are on the painter's area at this density.
 int count_for(const TexturePainter& painter, float per_square_metre);
+
+/// Something that stands on the floor and takes the light there; metres on the floor's texture, angle from x towards y.
+struct FloorShadow {
+  Eigen::Vector2f centre;
+  Eigen::Vector2f half;
+  float angle_rad = 0;
+};
+
+/// The shadows, and less light towards the walls.
+void shade_floor(TexturePainter& painter, std::span<const FloorShadow> shadows);
 
 /// A frame of `width` metres along the four edges.
 void frame_border(TexturePainter& painter, float width, Colour colour);
