@@ -1,29 +1,20 @@
 #include "slam/pose_solver.h"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <Eigen/Cholesky>
+
+#include "slam/reprojection.h"
 
 namespace posed {
 
 namespace {
 
-// 95 % quantiles of the chi-squared distribution with 2 and 3 degrees of freedom.
-constexpr double kChi2TwoDof = 5.991;
-constexpr double kChi2ThreeDof = 7.815;
 // Cutting residuals off at these bounds takes away the tails: what remains of Gaussian residuals has this share of their variance,
 // P(chi2_{d+2} < bound) / 0.95 for d degrees of freedom.
 constexpr double kKeptVarianceTwoDof = 0.8423;
 constexpr double kKeptVarianceThreeDof = 0.8771;
-constexpr double kMinDepth = 1e-3;  // [m] nearer, or behind: the projection says nothing
-
-struct Residual {
-  Eigen::Vector3d p_camera;
-  Eigen::Vector3d error;   // measured minus predicted: u, v, disparity
-  Eigen::Vector3d weight;  // zero for the disparity where there is none
-  double chi2 = std::numeric_limits<double>::infinity();
-};
 
 struct NormalEquations {
   Matrix6d hessian = Matrix6d::Zero();
@@ -31,60 +22,10 @@ struct NormalEquations {
   double cost = 0;
 };
 
-double chi2_bound(const PoseObservation& o) {
-  return o.disparity > 0 ? kChi2ThreeDof : kChi2TwoDof;
-}
-
-/// World-to-camera in the form that the inner loop wants.
-struct Projection {
-  Eigen::Matrix3d R_camera_map;
-  Eigen::Vector3d t_camera_map;
-  const CameraIntrinsics& k;
-
-  Projection(const Se3& T_map_camera, const CameraIntrinsics& intrinsics)
-      : R_camera_map(T_map_camera.rotation_matrix().transpose()),
-        t_camera_map(-(R_camera_map * T_map_camera.translation())),
-        k(intrinsics) {}
-
-  Residual residual(const PoseObservation& o) const {
-    Residual r;
-    r.p_camera = R_camera_map * o.p_map + t_camera_map;
-    if (r.p_camera.z() < kMinDepth) {
-      return r;
-    }
-    const double inverse_z = 1.0 / r.p_camera.z();
-    r.error.x() = o.ideal_pixel.x() - (k.fx * r.p_camera.x() * inverse_z + k.cx);
-    r.error.y() = o.ideal_pixel.y() - (k.fy * r.p_camera.y() * inverse_z + k.cy);
-    const bool has_depth = o.disparity > 0;
-    r.error.z() = has_depth ? o.disparity - k.baseline_fx * inverse_z : 0.0;
-    r.weight << o.pixel_weight, o.pixel_weight, has_depth ? o.disparity_weight : 0.0;
-    r.chi2 = (r.weight.array() * r.error.array().square()).sum();
-    return r;
-  }
-};
-
 /// Adds one observation. With p' = exp(-xi) p_camera: dp/dphi = skew(p), dp/drho = -I, so J = P * [S, -I] with P the projection's
 /// derivative, and all that is needed of P is A = P^T W P and g = P^T W e.
-void accumulate(const Residual& r, const CameraIntrinsics& k, double robust_weight, NormalEquations& n) {
-  const double inverse_z = 1.0 / r.p_camera.z();
-  const double inverse_z2 = inverse_z * inverse_z;
-  const double px = k.fx * inverse_z;
-  const double pxz = -k.fx * r.p_camera.x() * inverse_z2;
-  const double py = k.fy * inverse_z;
-  const double pyz = -k.fy * r.p_camera.y() * inverse_z2;
-  const double pd = -k.baseline_fx * inverse_z2;
-  const Eigen::Vector3d w = robust_weight * r.weight;
-
-  Eigen::Matrix3d a;
-  a(0, 0) = w.x() * px * px;
-  a(1, 1) = w.y() * py * py;
-  a(0, 1) = a(1, 0) = 0.0;
-  a(0, 2) = a(2, 0) = w.x() * px * pxz;
-  a(1, 2) = a(2, 1) = w.y() * py * pyz;
-  a(2, 2) = w.x() * pxz * pxz + w.y() * pyz * pyz + w.z() * pd * pd;
-  const Eigen::Vector3d g(w.x() * px * r.error.x(), w.y() * py * r.error.y(),
-                          w.x() * pxz * r.error.x() + w.y() * pyz * r.error.y() + w.z() * pd * r.error.z());
-
+void accumulate(const reprojection::Residual& r, const CameraIntrinsics& k, double robust_weight, NormalEquations& n) {
+  const auto [a, g] = reprojection::point_terms(k, r, robust_weight);
   const Eigen::Matrix3d s = skew(r.p_camera);
   const Eigen::Matrix3d as = a * s;
   n.hessian.topLeftCorner<3, 3>().noalias() += s.transpose() * as;
@@ -97,22 +38,18 @@ void accumulate(const Residual& r, const CameraIntrinsics& k, double robust_weig
 /// Normal equations and robust cost (Huber's, with the square root of the chi-squared bound as its corner) over the inliers.
 NormalEquations linearise(const PinholeCamera& camera, const Se3& T_map_camera, std::span<const PoseObservation> observations,
                           bool robust) {
-  const Projection projection(T_map_camera, camera.intrinsics());
+  const reprojection::Projection projection(T_map_camera);
   NormalEquations n;
   for (const PoseObservation& o : observations) {
     if (!o.inlier) {
       continue;
     }
-    const Residual r = projection.residual(o);
-    const double bound = chi2_bound(o);
-    if (!std::isfinite(r.chi2)) {
-      n.cost +=
-          4.0 * bound;  // a point behind the camera: a fixed penalty, so that a step that causes it does not look like progress
-      continue;
+    const reprojection::Residual r = projection.residual(camera.intrinsics(), o, o.p_map);
+    const double bound = reprojection::chi2_bound(o);
+    n.cost += reprojection::cost(r.chi2, bound, robust);
+    if (std::isfinite(r.chi2)) {
+      accumulate(r, camera.intrinsics(), reprojection::robust_weight(r.chi2, bound, robust), n);
     }
-    const bool linear_part = robust && r.chi2 > bound;
-    n.cost += linear_part ? 2.0 * std::sqrt(bound * r.chi2) - bound : r.chi2;
-    accumulate(r, camera.intrinsics(), linear_part ? std::sqrt(bound / r.chi2) : 1.0, n);
   }
   n.hessian.triangularView<Eigen::StrictlyUpper>() = n.hessian.transpose();
   return n;
@@ -157,11 +94,11 @@ struct Classification {
 };
 
 Classification classify(const PinholeCamera& camera, const Se3& T_map_camera, std::span<PoseObservation> observations) {
-  const Projection projection(T_map_camera, camera.intrinsics());
+  const reprojection::Projection projection(T_map_camera);
   Classification c;
   for (PoseObservation& o : observations) {
-    const double chi2 = projection.residual(o).chi2;
-    const bool inlier = chi2 <= chi2_bound(o);
+    const double chi2 = projection.residual(camera.intrinsics(), o, o.p_map).chi2;
+    const bool inlier = chi2 <= reprojection::chi2_bound(o);
     c.changed += inlier != o.inlier ? 1 : 0;
     o.inlier = inlier;
     if (inlier) {
