@@ -24,12 +24,10 @@ constexpr double kAgreement_m = 0.15;   // how far their corrections may differ
 constexpr double kAgreement_rad = 0.07;
 constexpr double kDriftFloor_m = 0.2;  // always plausible
 constexpr double kDriftFloor_rad = 0.1;
-constexpr double kDriftRate_rad_m = 0.05;     // of the path
-constexpr double kShortestLoop_m = 1.5;       // path between two keyframes for a loop to be worth closing
-constexpr int kLinkShared = 15;               // landmarks that hold two keyframes together
-constexpr std::size_t kAroundKeyframes = 10;  // whose landmarks a candidate is verified against
-constexpr std::size_t kAroundLandmarks = 3000;
-constexpr int kEssentialShared = 100;  // landmarks that make an edge of the essential graph
+constexpr double kDriftRate_rad_m = 0.05;  // of the path
+constexpr double kShortestLoop_m = 1.5;    // path between two keyframes for a loop to be worth closing
+constexpr int kLinkShared = 15;            // landmarks that hold two keyframes together
+constexpr int kEssentialShared = 100;      // landmarks that make an edge of the essential graph
 constexpr int kPoseGraphIterations = 30;
 constexpr std::size_t kFusedNeighbours = 10;
 constexpr float kFusionRadius = 6.0F;     // [pixels on level 0]: the pose graph leaves more than noise
@@ -135,15 +133,10 @@ class EssentialGraph {
 void move_keyframes(Map& map, const EssentialGraph& solved) {
   for (const LandmarkId id : map.landmark_ids()) {
     Landmark& landmark = *map.find_landmark(id);
-    const Observation& oldest = *std::min_element(landmark.observations.begin(), landmark.observations.end(),
-                                                  [](const auto& a, const auto& b) { return a.keyframe < b.keyframe; });
-    const Keyframe& keyframe = *map.find_keyframe(oldest.keyframe);
+    const KeyframeId oldest = landmark.oldest_observer();
+    const Keyframe& keyframe = *map.find_keyframe(oldest);
     if (keyframe.map_id == map.find_keyframe(solved.nodes().front())->map_id) {
-      const Se3 T_new_old = solved.pose(oldest.keyframe) * keyframe.T_map_camera.inverse();
-      const Eigen::Matrix3d R_new_old = T_new_old.rotation_matrix();
-      landmark.p_map = T_new_old * landmark.p_map;
-      landmark.mean_view_map = R_new_old * landmark.mean_view_map;
-      landmark.information = R_new_old * landmark.information * R_new_old.transpose();
+      landmark.move(solved.pose(oldest) * keyframe.T_map_camera.inverse());
     }
   }
   for (const KeyframeId id : solved.nodes()) {
@@ -154,14 +147,8 @@ void move_keyframes(Map& map, const EssentialGraph& solved) {
 }  // namespace
 
 LoopCloser::LoopCloser(const TrackerConfig& tracker, const MapperConfig& config, const LandmarkEstimator& estimator,
-                       LocalMapper& mapper, PlaceRecognizer& places, Map& map)
-    : config_(config),
-      estimator_(estimator),
-      mapper_(mapper),
-      places_(places),
-      map_(map),
-      verifier_(estimator.camera(), tracker),
-      frame_(estimator.camera(), feature_capacity(tracker.features)) {}
+                       LocalMapper& mapper, const PlaceRecognizer& places, Map& map)
+    : config_(config), estimator_(estimator), mapper_(mapper), map_(map), search_(tracker, estimator.camera(), places, map) {}
 
 Result<std::optional<LoopCorrection>> LoopCloser::close(KeyframeId keyframe) {
   ++keyframes_seen_;
@@ -196,22 +183,15 @@ std::optional<LoopCloser::Detection> LoopCloser::detect(KeyframeId keyframe) {
   const auto is_elsewhere = [&](KeyframeId id) {
     return id != keyframe && !k.covisible.contains(id) && path_to(id) >= kShortestLoop_m;
   };
-  places_.query(k.features.descriptors, kCandidates, is_elsewhere, candidates_);
-  if (candidates_.empty()) {
-    return std::nullopt;
-  }
-  frame_.place_stored(estimator_.camera(), k.features, k.ideal_pixels, k.depth_m);
   std::optional<Detection> best;
-  for (const PlaceCandidate& candidate : candidates_) {
-    write_local_map(map_, select_local_map(map_, candidate.keyframe, kAroundKeyframes, kAroundLandmarks), 1, around_);
-    std::optional<PlaceMatch> match = verifier_.verify(around_, around_.keyframes.front(), frame_, kMinInliers);
-    if (!match || match->covered < kMinCovered) {
+  for (auto& [matched, match] : search_.find(k.features, k.ideal_pixels, k.depth_m, is_elsewhere, {kCandidates, kMinInliers})) {
+    if (match.covered < kMinCovered) {
       continue;
     }
-    ++counters_.verified;
-    Detection detection{keyframe, candidate.keyframe, map_.find_keyframe(candidate.keyframe)->map_id, keyframes_seen_,
-                        std::move(*match)};
-    if (!is_plausible(detection, path_to(candidate.keyframe))) {
+    const Keyframe& there = *map_.find_keyframe(matched);
+    const Se3 T_keyframe_matched = match.T_map_camera.inverse() * there.T_map_camera;
+    Detection detection{keyframe, matched, there.map_id, keyframes_seen_, std::move(match), T_keyframe_matched};
+    if (!is_plausible(detection, path_to(matched))) {
       ++counters_.implausible;
       continue;
     }
@@ -255,16 +235,15 @@ bool LoopCloser::is_agreed(const Detection& detection) {
 
 Result<LoopCorrection> LoopCloser::correct_loop(const Detection& detection) {
   Keyframe& k = *map_.find_keyframe(detection.keyframe);
-  const Se3 T_keyframe_matched = detection.match.T_map_camera.inverse() * map_.find_keyframe(detection.matched)->T_map_camera;
   EssentialGraph essential(map_, k.map_id);
-  essential.add(detection.keyframe, detection.matched, T_keyframe_matched, edge_information());
+  essential.add(detection.keyframe, detection.matched, detection.T_keyframe_matched, edge_information());
   const Result<PoseGraphSummary> solved = optimize_pose_graph(essential.graph(), kPoseGraphIterations);
   if (!solved) {
     return tl::unexpected<Error>(solved.error());
   }
   const Se3 T_map_camera_before = k.T_map_camera;
   move_keyframes(map_, essential);
-  k.loops.push_back({detection.matched, T_keyframe_matched, edge_information()});
+  k.loops.push_back({detection.matched, detection.T_keyframe_matched, edge_information()});
   fuse_around(detection);
   const Se3 T_corrected_previous = k.T_map_camera * T_map_camera_before.inverse();
   return LoopCorrection{false, T_corrected_previous, detection.keyframe, detection.matched,
@@ -273,10 +252,9 @@ Result<LoopCorrection> LoopCloser::correct_loop(const Detection& detection) {
 
 LoopCorrection LoopCloser::join_maps(const Detection& detection) {
   Keyframe& k = *map_.find_keyframe(detection.keyframe);
-  const Se3 T_keyframe_matched = detection.match.T_map_camera.inverse() * map_.find_keyframe(detection.matched)->T_map_camera;
   const Se3 T_matched_map_own_map = detection.match.T_map_camera * k.T_map_camera.inverse();
   map_.join(k.map_id, detection.matched_map, T_matched_map_own_map);
-  k.loops.push_back({detection.matched, T_keyframe_matched, edge_information()});
+  k.loops.push_back({detection.matched, detection.T_keyframe_matched, edge_information()});
   fuse_around(detection);
   return LoopCorrection{true, T_matched_map_own_map, detection.keyframe, detection.matched, 0.0};
 }
@@ -296,7 +274,7 @@ void LoopCloser::fuse_around(const Detection& detection) {
     }
     estimator_.renew_appearance(map_, *map_.find_landmark(landmark));
   }
-  const LocalMap old_side = select_local_map(map_, detection.matched, kAroundKeyframes, kAroundLandmarks);
+  const LocalMap old_side = search_.surroundings(detection.matched);
   std::vector<KeyframeId> new_side = map_.covisible_keyframes(detection.keyframe, 1, kFusedNeighbours);
   new_side.insert(new_side.begin(), detection.keyframe);
   for (const KeyframeId id : new_side) {

@@ -7,13 +7,11 @@
 
 #include "config/config.h"
 #include "core/result.h"
-#include "slam/feature_frame.h"
 #include "slam/interrupt.h"
 #include "slam/local_mapper.h"
 #include "slam/map.h"
-#include "slam/map_snapshot.h"
 #include "slam/place_recognizer.h"
-#include "slam/place_verifier.h"
+#include "slam/place_search.h"
 
 namespace posed {
 
@@ -28,8 +26,7 @@ struct LoopCorrection {
 
 /// Counted since the start.
 struct LoopCounters {
-  std::uint64_t verified = 0;     ///< candidates that passed the geometric check
-  std::uint64_t implausible = 0;  ///< of those, refused because they ask for more drift than can be
+  std::uint64_t implausible = 0;  ///< confirmed places that were refused because they ask for more drift than can be
   std::uint64_t closed = 0;
   std::uint64_t joined = 0;
 };
@@ -42,7 +39,7 @@ class LoopCloser {
  public:
   /// Everything passed in must outlive it.
   LoopCloser(const TrackerConfig& tracker, const MapperConfig& config, const LandmarkEstimator& estimator, LocalMapper& mapper,
-             PlaceRecognizer& places, Map& map);
+             const PlaceRecognizer& places, Map& map);
 
   /// Looks for an earlier place in what `keyframe`, the newest, shows, and corrects the map where it is sure of one. The caller
   /// should adjust the whole map afterwards. Errors: of the pose graph; the map is unchanged then.
@@ -58,6 +55,7 @@ class LoopCloser {
     std::uint32_t matched_map = 0;
     std::uint64_t seen = 0;  ///< count of keyframes then
     PlaceMatch match;        ///< pose of `keyframe` in the map of `matched`
+    Se3 T_keyframe_matched;
   };
 
   std::optional<Detection> detect(KeyframeId keyframe);
@@ -70,12 +68,8 @@ class LoopCloser {
   MapperConfig config_;
   const LandmarkEstimator& estimator_;
   LocalMapper& mapper_;
-  PlaceRecognizer& places_;
   Map& map_;
-  PlaceVerifier verifier_;
-  FeatureFrame frame_;
-  MapSnapshot around_;
-  std::vector<PlaceCandidate> candidates_;
+  PlaceSearch search_;
   std::deque<Detection> recent_;
   std::uint64_t keyframes_seen_ = 0;
   LoopCounters counters_;

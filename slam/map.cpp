@@ -6,6 +6,20 @@
 
 namespace posed {
 
+KeyframeId Landmark::oldest_observer() const {
+  assert(!observations.empty());
+  return std::min_element(observations.begin(), observations.end(),
+                          [](const Observation& a, const Observation& b) { return a.keyframe < b.keyframe; })
+      ->keyframe;
+}
+
+void Landmark::move(const Se3& T_new_old) {
+  const Eigen::Matrix3d R_new_old = T_new_old.rotation_matrix();
+  p_map = T_new_old * p_map;
+  mean_view_map = R_new_old * mean_view_map;
+  information = R_new_old * information * R_new_old.transpose();
+}
+
 Keyframe& Map::add_keyframe(const KeyframeRecord& record) {
   assert(record.id != kNoKeyframe && !keyframes_.contains(record.id));
   Keyframe& keyframe = keyframes_[record.id];
@@ -147,31 +161,19 @@ void Map::remove_keyframe(KeyframeId keyframe) {
 }
 
 void Map::join(std::uint32_t from, std::uint32_t to, const Se3& T_to_from) {
-  const Eigen::Matrix3d R_to_from = T_to_from.rotation_matrix();
   for (auto& [id, k] : keyframes_) {
     if (k.map_id != from) {
       continue;
     }
-    for (std::size_t i = 0; i < k.landmarks.size(); ++i) {
-      // A landmark is moved by the first keyframe of those that see it.
-      Landmark* const l = k.landmarks[i] == kNoLandmark ? nullptr : find_landmark(k.landmarks[i]);
-      if (l != nullptr && std::all_of(l->observations.begin(), l->observations.end(),
-                                      [id = id](const Observation& o) { return o.keyframe >= id; })) {
-        l->p_map = T_to_from * l->p_map;
-        l->mean_view_map = R_to_from * l->mean_view_map;
-        l->information = R_to_from * l->information * R_to_from.transpose();
+    for (const LandmarkId landmark : k.landmarks) {
+      Landmark* const l = landmark == kNoLandmark ? nullptr : find_landmark(landmark);
+      if (l != nullptr && l->oldest_observer() == id) {
+        l->move(T_to_from);
       }
     }
     k.T_map_camera = T_to_from * k.T_map_camera;
+    k.map_id = to;
   }
-  for (auto& [id, k] : keyframes_) {
-    k.map_id = k.map_id == from ? to : k.map_id;
-  }
-}
-
-void Map::clear() {
-  keyframes_.clear();
-  landmarks_.clear();  // identifiers go on: those of an earlier map are never mistaken for new ones
 }
 
 Landmark* Map::find_landmark(LandmarkId id) {

@@ -25,6 +25,12 @@ struct Landmark {
   std::vector<Observation> observations;  ///< in the order they were made
   std::uint32_t predicted = 0;            ///< keyframes that should have seen it
   std::uint32_t found = 0;                ///< keyframes that did
+
+  /// The oldest keyframe that sees it: who moves, moves it along. There must be one.
+  KeyframeId oldest_observer() const;
+
+  /// Where the map around it is moved by T_new_old.
+  void move(const Se3& T_new_old);
 };
 
 /// A place that was seen again: the pose of another keyframe relative to this one, measured by matching their features.
@@ -87,8 +93,6 @@ class Map {
 
   /// Moves everything of map `from` by T_to_from and makes it part of map `to`.
   void join(std::uint32_t from, std::uint32_t to, const Se3& T_to_from);
-
-  void clear();
 
   Landmark* find_landmark(LandmarkId id);
   const Landmark* find_landmark(LandmarkId id) const;

@@ -1,15 +1,11 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "config/config.h"
-#include "slam/feature_frame.h"
 #include "slam/keyframe_record.h"
 #include "slam/map.h"
-#include "slam/map_snapshot.h"
-#include "slam/place_recognizer.h"
-#include "slam/place_verifier.h"
+#include "slam/place_search.h"
 
 namespace posed {
 
@@ -27,14 +23,9 @@ class Relocalizer {
   std::optional<Found> find(const KeyframeRecord& frame);
 
  private:
-  PinholeCamera camera_;
   int min_inliers_;
-  const PlaceRecognizer& places_;
   const Map& map_;
-  PlaceVerifier verifier_;
-  FeatureFrame frame_;
-  MapSnapshot around_;
-  std::vector<PlaceCandidate> candidates_;
+  PlaceSearch search_;
 };
 
 }  // namespace posed
