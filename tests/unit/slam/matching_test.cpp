@@ -4,31 +4,15 @@
 #include <gtest/gtest.h>
 
 #include "slam/keyframe_recovery.h"
-#include "slam/mapper.h"
 #include "slam/projection_matcher.h"
-#include "tests/support/feature_world.h"
+#include "tests/support/one_keyframe_map.h"
 
 namespace posed {
 namespace {
 
-/// A map of one keyframe at the origin, to be matched from elsewhere.
-struct MatchingTest : testing::Test {
-  FeatureWorld world{4};
-  TrackerConfig config = [] {
-    TrackerConfig t;
-    t.close_depth_m = 10;
-    return t;
-  }();
-  PinholeCamera camera{world.intrinsics};
+struct MatchingTest : OneKeyframeMap {
   ProjectionMatcher matcher{camera, config};
-  MapSnapshot map;
   Se3 T_map_camera = Se3::exp((Vector6d() << 0.02, 0.05, -0.1, 0.2, 0.1, 0.15).finished());
-
-  void SetUp() override {
-    Mapper mapper(config, MapperConfig{}, MapMode::Mapping, world.intrinsics);
-    mapper.insert(FeatureWorld::record(world.view(Se3(), 0, 0, 0), 1, {}));
-    mapper.write_snapshot(map);
-  }
 
   std::vector<ProjectedLandmark> project_all(const FeatureFrame& frame, const Se3& pose) const {
     std::vector<ProjectedLandmark> projected;

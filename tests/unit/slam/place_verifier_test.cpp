@@ -9,30 +9,17 @@
 #include "drivers/synthetic_camera.h"
 #include "slam/mapper.h"
 #include "slam/orb_extractor.h"
-#include "tests/support/feature_world.h"
+#include "tests/support/one_keyframe_map.h"
 
 namespace posed {
 namespace {
 
 constexpr int kMinInliers = 40;
 
-struct PlaceVerifierTest : testing::Test {
-  FeatureWorld world{4};
-  TrackerConfig config = [] {
-    TrackerConfig t;
-    t.close_depth_m = 10;
-    return t;
-  }();
-  PinholeCamera camera{world.intrinsics};
+struct PlaceVerifierTest : OneKeyframeMap {
   PlaceVerifier verifier{camera, config};
-  MapSnapshot map;
   Se3 T_map_camera = Se3::exp((Vector6d() << 0.05, 0.15, -0.2, 0.3, 0.1, 0.2).finished());
 
-  void SetUp() override {
-    Mapper mapper(config, MapperConfig{}, MapMode::Mapping, world.intrinsics);
-    mapper.insert(FeatureWorld::record(world.view(Se3(), 0, 0, 0), 1, {}));
-    mapper.write_snapshot(map);
-  }
   std::optional<PlaceMatch> verify(const FeatureFrame& frame, int min_inliers = kMinInliers) {
     return verifier.verify(map, map.keyframes.front(), frame, min_inliers);
   }
