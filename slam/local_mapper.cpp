@@ -28,8 +28,10 @@ LocalMapper::LocalMapper(const TrackerConfig& tracker, const MapperConfig& confi
       fusion_(estimator, tracker),
       adjuster_(estimator) {}
 
-void LocalMapper::insert(const KeyframeRecord& record) {
-  map_.add_keyframe(record);
+void LocalMapper::insert(const KeyframeRecord& record, std::uint32_t map_id, const Se3& T_map_camera) {
+  Keyframe& keyframe = map_.add_keyframe(record);
+  keyframe.map_id = map_id;
+  keyframe.T_map_camera = T_map_camera;
   extend_observed(record);
   judge_predicted(record);
   create_from_depth(record);
@@ -143,20 +145,21 @@ double LocalMapper::redundancy(const Keyframe& keyframe) const {
   return judged == 0 ? 1.0 : static_cast<double>(redundant) / judged;
 }
 
-std::vector<KeyframeId> LocalMapper::redundant_keyframes(KeyframeId keyframe, std::size_t kept_newest) const {
+bool LocalMapper::is_redundant(const Keyframe& keyframe) const {
+  return redundancy(keyframe) > kRedundantShare;
+}
+
+std::vector<KeyframeId> LocalMapper::droppable_keyframes(KeyframeId keyframe, std::size_t kept_newest) const {
   KeyframeId newest_judged = kNoKeyframe;
   if (map_.keyframes().size() > kept_newest) {
     newest_judged = std::prev(map_.keyframes().end(), static_cast<std::ptrdiff_t>(kept_newest) + 1)->first;
   }
-  std::vector<KeyframeId> redundant;
-  for (const KeyframeId id : map_.covisible_keyframes(keyframe, kLeastShared, kCullNeighbours)) {
+  std::vector<KeyframeId> droppable = map_.covisible_keyframes(keyframe, kLeastShared, kCullNeighbours);
+  std::erase_if(droppable, [&](KeyframeId id) {
     const Keyframe& candidate = *map_.find_keyframe(id);
-    if (id <= newest_judged && candidate.parent != kNoKeyframe && candidate.loops.empty() &&
-        redundancy(candidate) > kRedundantShare) {
-      redundant.push_back(id);
-    }
-  }
-  return redundant;
+    return id > newest_judged || candidate.parent == kNoKeyframe || !candidate.loops.empty();
+  });
+  return droppable;
 }
 
 }  // namespace posed

@@ -21,9 +21,10 @@ class LocalMapper {
   /// Everything passed in must outlive it.
   LocalMapper(const TrackerConfig& tracker, const MapperConfig& config, const LandmarkEstimator& estimator, Map& map);
 
-  /// Takes a keyframe in at `record.T_map_camera`: links its matches, which move their landmarks; removes landmarks that keyframes
-  /// keep missing; makes landmarks of its depths. Short: the tracker waits for its outcome.
-  void insert(const KeyframeRecord& record);
+  /// Takes a keyframe in, at `T_map_camera` of map `map_id`, which may have changed since the tracker wrote them: links its
+  /// matches, which move their landmarks; removes landmarks that keyframes keep missing; makes landmarks of its depths. Short: the
+  /// tracker waits for its outcome.
+  void insert(const KeyframeRecord& record, std::uint32_t map_id, const Se3& T_map_camera);
 
   /// Looks at the neighbours of a keyframe: triangulates what has no trusted depth, joins landmarks that are the same point.
   /// Gives up between two neighbours where interrupted.
@@ -32,13 +33,15 @@ class LocalMapper {
   /// Bundle adjustment of the keyframe's neighbourhood.
   BundleSummary adjust(KeyframeId keyframe, const Interrupt& interrupt);
 
-  /// Neighbours of `keyframe` nearly all of whose landmarks at least three other keyframes see at least as well (Mur-Artal,
-  /// Montiel, Tardos, "ORB-SLAM", T-RO 2015, section VI-E); never one of the `kept_newest` newest, nor a root of the spanning tree,
-  /// nor one that holds a loop together.
-  std::vector<KeyframeId> redundant_keyframes(KeyframeId keyframe, std::size_t kept_newest) const;
+  /// Neighbours of `keyframe` that may be dropped: not one of the `kept_newest` newest, nor a root of the spanning tree, nor one
+  /// that holds a loop together.
+  std::vector<KeyframeId> droppable_keyframes(KeyframeId keyframe, std::size_t kept_newest) const;
 
   /// Share of a keyframe's landmarks that at least three others see at least as well, 0 to 1.
   double redundancy(const Keyframe& keyframe) const;
+
+  /// Whether that is nearly all of them (Mur-Artal, Montiel, Tardos, "ORB-SLAM", T-RO 2015, section VI-E).
+  bool is_redundant(const Keyframe& keyframe) const;
 
   MapAdjuster& adjuster() { return adjuster_; }
   LandmarkFusion& fusion() { return fusion_; }

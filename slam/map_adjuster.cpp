@@ -19,6 +19,14 @@ KeyframeId oldest_of(const Map& map, std::uint32_t map_id) {
 
 MapAdjuster::MapAdjuster(const LandmarkEstimator& estimator) : estimator_(estimator), adjuster_(estimator.camera()) {}
 
+void MapAdjuster::begin() {
+  problem_.clear();
+  cameras_.clear();
+  camera_of_.clear();
+  points_.clear();
+  point_of_.clear();
+}
+
 void MapAdjuster::add_camera(const Map& map, KeyframeId keyframe, bool fixed) {
   camera_of_.emplace(keyframe, static_cast<std::uint32_t>(cameras_.size()));
   cameras_.push_back(keyframe);
@@ -53,11 +61,7 @@ void MapAdjuster::add_observations(const Map& map) {
 }
 
 BundleSummary MapAdjuster::adjust_around(Map& map, KeyframeId centre, const Window& window, const Interrupt& interrupt) {
-  problem_.clear();
-  cameras_.clear();
-  camera_of_.clear();
-  points_.clear();
-  point_of_.clear();
+  begin();
   const KeyframeId oldest = oldest_of(map, map.find_keyframe(centre)->map_id);
   add_camera(map, centre, centre == oldest);
   for (const KeyframeId id : map.covisible_keyframes(centre, kLeastShared, window.free_keyframes - 1)) {
@@ -89,11 +93,7 @@ BundleSummary MapAdjuster::adjust_around(Map& map, KeyframeId centre, const Wind
 }
 
 BundleSummary MapAdjuster::adjust_all(Map& map, std::uint32_t map_id, int iterations, const Interrupt& interrupt) {
-  problem_.clear();
-  cameras_.clear();
-  camera_of_.clear();
-  points_.clear();
-  point_of_.clear();
+  begin();
   for (const auto& [id, keyframe] : map.keyframes()) {
     if (keyframe.map_id == map_id) {
       add_camera(map, id, cameras_.empty());

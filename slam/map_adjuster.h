@@ -28,6 +28,7 @@ class MapAdjuster {
   BundleSummary adjust_all(Map& map, std::uint32_t map_id, int iterations, const Interrupt& interrupt);
 
  private:
+  void begin();
   void add_camera(const Map& map, KeyframeId keyframe, bool fixed);
   void add_landmarks_of(const Map& map, KeyframeId keyframe);
   void add_observations(const Map& map);

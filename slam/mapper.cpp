@@ -25,9 +25,8 @@ namespace {
 
 constexpr std::size_t kYoungMapKeyframes = 5;  // a map that is left with fewer is not worth keeping
 constexpr std::size_t kKeptNewest = 3;         // keyframes not judged redundant yet
-constexpr double kRedundantShare = 0.9;
-constexpr double kAnchorShare = 0.2;  // of its landmarks that a keyframe must share with the one whose drift it inherits
-constexpr int kFullIterations = 10;   // a round
+constexpr double kAnchorShare = 0.2;           // of its landmarks that a keyframe must share with the one whose drift it inherits
+constexpr int kFullIterations = 10;            // a round
 
 /// Interrupts when asked to, or after `budget_s`; never where nobody asks (lockstep).
 Interrupt within(const Interrupt& interrupt, double budget_s) {
@@ -141,12 +140,9 @@ void Mapper::Impl::begin_map(const KeyframeRecord& record) {
 
 void Mapper::Impl::insert_keyframe(const KeyframeRecord& record) {
   // The map may have been corrected, or joined with another, since the snapshot that the tracker used.
-  KeyframeRecord moved = record;
-  moved.T_map_camera = T_map_odom * record.T_map_odom.inverse() * record.T_map_camera;
-  if (!record.starts_map && !map.has_map(record.map_id)) {
-    moved.map_id = map.find_keyframe(newest)->map_id;  // its map was joined with another
-  }
-  local.insert(moved);
+  const bool is_joined = !record.starts_map && !map.has_map(record.map_id);
+  local.insert(record, is_joined ? map.find_keyframe(newest)->map_id : record.map_id,
+               T_map_odom * record.T_map_odom.inverse() * record.T_map_camera);
   newest = record.id;
   centre = record.id;
   renew_anchor(record.covariance);
@@ -276,8 +272,8 @@ void Mapper::Impl::adjust_all(const Interrupt& interrupt) {
 }
 
 void Mapper::Impl::cull() {
-  for (const KeyframeId id : local.redundant_keyframes(newest, kKeptNewest)) {
-    if (local.redundancy(*map.find_keyframe(id)) > kRedundantShare) {  // those that went before may have changed it
+  for (const KeyframeId id : local.droppable_keyframes(newest, kKeptNewest)) {
+    if (local.is_redundant(*map.find_keyframe(id))) {  // judged one by one: what goes takes a witness from the others
       drop(id);
     }
   }
