@@ -1,24 +1,17 @@
-#include "config/camera_file.h"
-
 #include <algorithm>
-#include <cstdlib>
+#include <filesystem>
 #include <string>
-#include <string_view>
 
 #include <fmt/format.h>
 
 #include "config/config_loader.h"
+#include "config/data_file.h"
 #include "config/strict_reader.h"
 #include "config/text_file.h"
 
 namespace posed {
 
 namespace {
-
-bool is_file(const std::filesystem::path& path) {
-  std::error_code ignored;  // what cannot be looked at is not there for us
-  return std::filesystem::is_regular_file(path, ignored);
-}
 
 /// Whether the lens model maps distinct directions to distinct pixels across the image, so that it can be inverted: the radial
 /// factor times the radius must grow with the radius, up to the farthest corner.
@@ -37,41 +30,6 @@ bool is_distortion_invertible(const CameraIntrinsics& k) {
 
 }  // namespace
 
-std::vector<std::filesystem::path> calibration_folders() {
-  std::vector<std::filesystem::path> folders;
-  if (const char* variable = std::getenv("POSED_CAMERA_PATH"); variable != nullptr) {
-    std::string_view rest = variable;
-    while (!rest.empty()) {
-      const std::string_view folder = rest.substr(0, rest.find(':'));
-      if (!folder.empty()) {
-        folders.emplace_back(folder);
-      }
-      rest.remove_prefix(std::min(rest.size(), folder.size() + 1));
-    }
-  }
-  folders.emplace_back(POSED_SOURCE_CAMERAS);
-  folders.emplace_back(POSED_INSTALLED_CAMERAS);
-  return folders;
-}
-
-Result<std::filesystem::path> find_calibration(const std::filesystem::path& name, std::vector<std::filesystem::path> folders) {
-  if (name.is_absolute()) {
-    return is_file(name) ? Result<std::filesystem::path>(name) : make_error(ErrorCode::Io, "there is no such file");
-  }
-  for (std::filesystem::path& folder : calibration_folders()) {
-    folders.push_back(std::move(folder));
-  }
-  std::string tried;
-  for (const std::filesystem::path& folder : folders) {
-    std::filesystem::path candidate = (folder / name).lexically_normal();
-    if (is_file(candidate)) {
-      return candidate;
-    }
-    tried += (tried.empty() ? "" : ", ") + candidate.string();
-  }
-  return make_error(ErrorCode::Io, fmt::format("there is no such file; looked for {}", tried));
-}
-
 Result<CameraIntrinsics> parse_camera(const std::string& text, const std::filesystem::path& name) {
   CameraIntrinsics k;
   StrictReader reader(name, camera_schema(k));
@@ -88,7 +46,7 @@ Result<CameraIntrinsics> parse_camera(const std::string& text, const std::filesy
 }
 
 Result<CameraIntrinsics> load_camera(const std::filesystem::path& path) {
-  const Result<std::filesystem::path> file = find_calibration(path, {""});
+  const Result<std::filesystem::path> file = find_file(path, {""}, calibration_folders());
   if (!file) {
     return make_error(file.error().code, fmt::format("{}: cannot be read: {}", path.string(), file.error().message));
   }

@@ -84,6 +84,25 @@ struct MapConfig {
   MapMode mode = MapMode::Mapping;
 };
 
+enum class DetectorEngine {
+  Posed,   ///< the project's runner, which can be stopped between any two of its steps
+  OpenCv,  ///< OpenCV's DNN module
+};
+
+enum class DetectorHead { Anchors, Boxes, Yolox };  ///< detect/box_decoder.h
+
+struct DetectorConfig {
+  bool enabled = true;
+  std::vector<std::string> models{"person-s.posednet", "person-m.posednet", "person-l.posednet"};  ///< from cheap to costly
+  double budget_s = 0.033;  ///< after which a frame is given up (not in lockstep)
+  int lockstep_model = 1;   ///< index into `models`, of the one that looks in lockstep
+  double score = 0.4;       ///< least confidence
+  double iou = 0.5;         ///< of two boxes that overlap by more, one goes
+  DetectorEngine engine = DetectorEngine::Posed;
+  DetectorHead head = DetectorHead::Anchors;
+  int person_class = 0;  ///< of the model's classes
+};
+
 struct PublisherConfig {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string channel_prefix = "POSED_";
@@ -108,6 +127,7 @@ struct PipelineConfig {
   ThreadConfig capture;
   ThreadConfig tracker;
   ThreadConfig mapper;
+  ThreadConfig detector;
   ThreadConfig publisher;
 };
 
@@ -121,6 +141,7 @@ struct Config {
   TrackerConfig tracker;
   MapperConfig mapper;
   MapConfig map;
+  DetectorConfig detector;
   PublisherConfig publisher;
   PipelineConfig pipeline;
   LoggingConfig logging;

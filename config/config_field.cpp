@@ -113,24 +113,7 @@ struct Assign {
   }
 
   Problem operator()(const IntegerListField& f) const {
-    const auto* elements = std::get_if<std::vector<TomlValue>>(&value.data);
-    if (elements == nullptr) {
-      return wrong_type(value, type_text(field), allowed_text(field));
-    }
-    if (elements->size() > f.max_size) {
-      return refuse(value, fmt::format("too long ({}), allowed {}", elements->size(), allowed_text(field)));
-    }
-    std::vector<int> read;
-    for (std::size_t i = 0; i < elements->size(); ++i) {
-      int element = 0;
-      if (Problem problem = posed::assign(IntegerField{&element, f.minimum, f.maximum}, (*elements)[i])) {
-        problem->reason = fmt::format("element {} of {}: {}", i + 1, elements->size(), problem->reason);
-        return problem;
-      }
-      read.push_back(element);
-    }
-    *f.value = std::move(read);
-    return std::nullopt;
+    return assign_list<int>(f, [&](int& element) { return IntegerField{&element, f.minimum, f.maximum}; });
   }
 
   Problem operator()(const TextField& f) const {
@@ -143,6 +126,10 @@ struct Assign {
     }
     *f.value = *text;
     return std::nullopt;
+  }
+
+  Problem operator()(const TextListField& f) const {
+    return assign_list<std::string>(f, [&](std::string& element) { return TextField{&element, f.rule}; });
   }
 
   Problem operator()(const ChoiceField& f) const {
@@ -174,6 +161,30 @@ struct Assign {
     *f.value = Se3(rotation, {v[0], v[1], v[2]});
     return std::nullopt;
   }
+
+ private:
+  /// `element_field` makes the field of one element.
+  template <typename Element, typename List, typename ElementField>
+  Problem assign_list(const List& f, ElementField&& element_field) const {
+    const auto* elements = std::get_if<std::vector<TomlValue>>(&value.data);
+    if (elements == nullptr) {
+      return wrong_type(value, type_text(field), allowed_text(field));
+    }
+    if (elements->size() > f.max_size) {
+      return refuse(value, fmt::format("too long ({}), allowed {}", elements->size(), allowed_text(field)));
+    }
+    std::vector<Element> read;
+    for (std::size_t i = 0; i < elements->size(); ++i) {
+      Element element{};
+      if (Problem problem = posed::assign(element_field(element), (*elements)[i])) {
+        problem->reason = fmt::format("element {} of {}: {}", i + 1, elements->size(), problem->reason);
+        return problem;
+      }
+      read.push_back(std::move(element));
+    }
+    *f.value = std::move(read);
+    return std::nullopt;
+  }
 };
 
 struct ValueText {
@@ -189,6 +200,11 @@ struct ValueText {
   }
   std::string operator()(const IntegerListField& f) const { return fmt::format("[{}]", fmt::join(*f.value, ", ")); }
   std::string operator()(const TextField& f) const { return quoted(*f.value); }
+  std::string operator()(const TextListField& f) const {
+    std::vector<std::string> texts;
+    std::transform(f.value->begin(), f.value->end(), std::back_inserter(texts), [](const std::string& t) { return quoted(t); });
+    return fmt::format("[{}]", fmt::join(texts, ", "));
+  }
   std::string operator()(const ChoiceField& f) const { return quoted(f.get()); }
   std::string operator()(const PoseField& f) const {
     const Eigen::Vector3d& t = f.value->translation();
@@ -207,6 +223,7 @@ struct TypeText {
   std::string operator()(const RealListField& f) const { return fmt::format("array of {} numbers", f.values.size()); }
   std::string operator()(const IntegerListField&) const { return "array of integers"; }
   std::string operator()(const TextField&) const { return "string"; }
+  std::string operator()(const TextListField&) const { return "array of strings"; }
   std::string operator()(const ChoiceField&) const { return "string"; }
   std::string operator()(const PoseField&) const { return "array of 7 numbers"; }
 };
@@ -220,6 +237,7 @@ struct AllowedText {
     return fmt::format("at most {}, each {} to {}", f.max_size, f.minimum, f.maximum);
   }
   std::string operator()(const TextField& f) const { return std::string(f.rule.allowed); }
+  std::string operator()(const TextListField& f) const { return fmt::format("at most {}, each {}", f.max_size, f.rule.allowed); }
   std::string operator()(const ChoiceField& f) const {
     std::string text;
     for (std::size_t i = 0; i < f.names.size(); ++i) {

@@ -57,6 +57,12 @@ struct TextField {
   TextRule rule;
 };
 
+struct TextListField {
+  std::vector<std::string>* value;
+  TextRule rule;  ///< of each
+  std::size_t max_size;
+};
+
 /// A name out of a few. An enumeration's, or a string's that holds the name itself.
 struct ChoiceField {
   std::vector<std::string_view> names;
@@ -71,7 +77,8 @@ struct PoseField {
   static constexpr double kQuaternionTolerance = 1e-3;
 };
 
-using Field = std::variant<BoolField, IntegerField, RealField, RealListField, IntegerListField, TextField, ChoiceField, PoseField>;
+using Field = std::variant<BoolField, IntegerField, RealField, RealListField, IntegerListField, TextField, TextListField,
+                           ChoiceField, PoseField>;
 
 /// Why a value was refused.
 struct FieldProblem {

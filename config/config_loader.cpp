@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "config/camera_file.h"
 #include "config/config_schema.h"
+#include "config/data_file.h"
 #include "config/strict_reader.h"
 #include "config/text_file.h"
 
@@ -68,7 +68,7 @@ void resolve_path(const std::filesystem::path& folder, std::string& path) {
 
 /// Reads the calibration that `config` names; `folders` come before the shipped ones.
 void read_calibration(StrictReader& reader, std::vector<std::filesystem::path> folders, Config& config) {
-  const Result<std::filesystem::path> file = find_calibration(config.camera.calibration, std::move(folders));
+  const Result<std::filesystem::path> file = find_file(config.camera.calibration, std::move(folders), calibration_folders());
   if (!file) {
     reader.require(false, {"camera.calibration"}, file.error().message);
     return;
@@ -83,6 +83,21 @@ void read_calibration(StrictReader& reader, std::vector<std::filesystem::path> f
   check_pyramid(reader, config);
 }
 
+/// Makes their paths ready to open; `folders` come before the shipped models' ones.
+void find_models(StrictReader& reader, const std::vector<std::filesystem::path>& folders, DetectorConfig& detector) {
+  if (!detector.enabled) {
+    return;
+  }
+  reader.require(!detector.models.empty(), {"detector.models"}, "names no file; set detector.enabled = false to look for nobody");
+  for (std::string& model : detector.models) {
+    if (const Result<std::filesystem::path> file = find_file(model, folders, model_folders())) {
+      model = file->string();
+    } else {
+      reader.require(false, {"detector.models"}, fmt::format("{}: {}", model, file.error().message));
+    }
+  }
+}
+
 Result<Config> read_config(const std::string& text, const std::filesystem::path& name, std::vector<std::filesystem::path> folders) {
   Config config;
   StrictReader reader(name, config_schema(config));
@@ -91,10 +106,12 @@ Result<Config> read_config(const std::string& text, const std::filesystem::path&
   check_thread(reader, "pipeline.capture", config.pipeline.capture);
   check_thread(reader, "pipeline.tracker", config.pipeline.tracker);
   check_thread(reader, "pipeline.mapper", config.pipeline.mapper);
+  check_thread(reader, "pipeline.detector", config.pipeline.detector);
   check_thread(reader, "pipeline.publisher", config.pipeline.publisher);
   resolve_path(name.parent_path(), config.source.replay.sequence);
   resolve_path(name.parent_path(), config.source.replay.associations);
   resolve_path(name.parent_path(), config.map.file);
+  find_models(reader, folders, config.detector);
   read_calibration(reader, std::move(folders), config);
   return reader.status().map([&] { return config; });
 }

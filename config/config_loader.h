@@ -11,8 +11,9 @@ namespace posed {
 
 /// Reads `path`, strictly: an unknown key, a wrong type, a value out of range, a duplicate or a syntax error is an error that names
 /// file, line, column, key, the value read and what is allowed. All mistakes of the file are reported, one a line. Also reads the
-/// camera calibration that the file names, and makes relative paths start at the file's folder: `camera.calibration` and
-/// `source.replay.*` come back ready to open. Error code: InvalidConfig, or Io where `path` cannot be read. Reentrant.
+/// camera calibration that the file names, and makes relative paths start at the file's folder: `camera.calibration`,
+/// `source.replay.*` and, where the detector is enabled, `detector.models` come back ready to open. Error code: InvalidConfig, or
+/// Io where `path` cannot be read. Reentrant.
 Result<Config> load_config(const std::filesystem::path& path);
 
 /// As `load_config`, from text; `name` stands for the file in messages and its folder for relative paths.
@@ -27,6 +28,9 @@ Result<CameraIntrinsics> load_camera(const std::filesystem::path& path);
 
 /// As `load_camera`, from text; `name` stands for the file in messages.
 Result<CameraIntrinsics> parse_camera(const std::string& text, const std::filesystem::path& name);
+
+/// Where shipped models are looked for: $POSED_MODEL_PATH, then as `calibration_folders`.
+std::vector<std::filesystem::path> model_folders();
 
 /// Where shipped calibrations are looked for, in this order: $POSED_CAMERA_PATH (colon-separated), the build's source tree, the
 /// installed data folder. Reads the environment: reentrant as long as nothing changes it.

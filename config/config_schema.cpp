@@ -203,6 +203,31 @@ void add_map(SchemaBuilder& schema, MapConfig& c) {
            "`mapping` extends the map; `localization` uses the map of `file`, and neither changes nor saves it.");
 }
 
+void add_detector(SchemaBuilder& schema, DetectorConfig& c) {
+  constexpr std::size_t kMaxModels = 8;
+  schema.section("detector", "The detector of people, which keeps to a time budget.")
+      .key("enabled", BoolField{&c.enabled}, "", "Look for people.")
+      .key("models", TextListField{&c.models, {"the name of a file", is_file_name}, kMaxModels}, "",
+           "Networks, from cheap to costly: for each frame the largest whose 95 % quantile of the time fits `budget_s`. A relative "
+           "name is looked for beside this file, then in the folders of $POSED_MODEL_PATH, then among the shipped models.")
+      .key("budget_s", real(c.budget_s, 0.001, 10.0), "s",
+           "A frame that takes longer is given up, and counted. Without effect in `lockstep`.")
+      .key("lockstep_model", integer(c.lockstep_model, 0, static_cast<int>(kMaxModels) - 1), "",
+           "Which of `models`, counted from 0, looks in `lockstep`, where no clock may decide. The last one where there are fewer.")
+      .key("score", real(c.score, 0.01, 0.99), "", "Boxes of less confidence are not reported.")
+      .key("iou", real(c.iou, 0.05, 0.95), "",
+           "Of two boxes that overlap by more (intersection over union), the less confident one goes.")
+      .key("engine", choice(c.engine, {{"posed", DetectorEngine::Posed}, {"opencv", DetectorEngine::OpenCv}}), "",
+           "What runs the networks: `posed` its own files (`.posednet`) and ONNX files of the same kind, within the budget; "
+           "`opencv` "
+           "other ONNX files, by OpenCV's DNN module, which cannot be stopped when the budget is spent.")
+      .key("head",
+           choice(c.head, {{"anchors", DetectorHead::Anchors}, {"boxes", DetectorHead::Boxes}, {"yolox", DetectorHead::Yolox}}), "",
+           "What the networks put out: `anchors` as the shipped ones; `boxes` one table of decoded boxes, as Ultralytics exports "
+           "YOLOv5; `yolox` as Megvii exports YOLOX.")
+      .key("person_class", integer(c.person_class, 0, 100'000), "", "Which of the networks' classes is a person.");
+}
+
 void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {
   schema.section("publisher", "What is published over LCM.")
       .key("url", TextField{&c.url, {"an LCM address such as \"udpm://239.255.76.67:7667?ttl=0\"", is_lcm_url}}, "",
@@ -240,6 +265,7 @@ void add_pipeline(SchemaBuilder& schema, PipelineConfig& c) {
   add_thread(schema, "capture", "The thread that takes frames from the source.", c.capture);
   add_thread(schema, "tracker", "The thread that computes poses.", c.tracker);
   add_thread(schema, "mapper", "The thread that keeps the map.", c.mapper);
+  add_thread(schema, "detector", "The thread that finds people.", c.detector);
   add_thread(schema, "publisher", "The thread that sends messages.", c.publisher);
 }
 
@@ -252,6 +278,7 @@ Schema config_schema(Config& config) {
   add_tracker(schema, config.tracker);
   add_mapper(schema, config.mapper);
   add_map(schema, config.map);
+  add_detector(schema, config.detector);
   add_publisher(schema, config.publisher);
   add_pipeline(schema, config.pipeline);
   schema.section("logging", "Messages for people, on standard error.")

@@ -92,6 +92,8 @@ void randomise(const Field& field, std::mt19937_64& random) {
     for (int& value : *is->value) {
       value = static_cast<int>(pick(is->minimum, is->maximum));
     }
+  } else if (const auto* ts = std::get_if<TextListField>(&field)) {
+    std::shuffle(ts->value->begin(), ts->value->end(), random);
   } else if (const auto* c = std::get_if<ChoiceField>(&field)) {
     c->set(c->names[static_cast<std::size_t>(pick(0, static_cast<std::int64_t>(c->names.size()) - 1))]);
   } else if (const auto* p = std::get_if<PoseField>(&field)) {

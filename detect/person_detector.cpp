@@ -1,0 +1,163 @@
+#include "detect/person_detector.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "detect/network_file.h"
+#include "detect/network_runner.h"
+#include "detect/opencv_network.h"
+
+namespace posed {
+
+namespace {
+
+constexpr int kWarmUpRuns = 2;  // first touch of the weights
+constexpr int kTimedRuns = 5;
+
+DetectionThresholds thresholds(const DetectorConfig& config) {
+  return {static_cast<float>(config.score), static_cast<float>(config.iou)};
+}
+
+HeadKind head_kind(DetectorHead head) {
+  switch (head) {
+    case DetectorHead::Anchors: return HeadKind::Anchors;
+    case DetectorHead::Boxes: return HeadKind::Boxes;
+    case DetectorHead::Yolox: return HeadKind::Yolox;
+  }
+  return HeadKind::Anchors;
+}
+
+Result<std::unique_ptr<ObjectDetector>> load_own(const DetectorConfig& config, const std::string& file) {
+  Result<Network> network = load_network(file);
+  if (!network) {
+    return tl::unexpected<Error>(network.error());
+  }
+  const Precision precision = network->ranges().empty() ? Precision::Float32 : Precision::Int8;
+  Result<std::unique_ptr<NetworkRunner>> runner = NetworkRunner::create(*network, precision);
+  if (!runner) {
+    return tl::unexpected<Error>(runner.error());
+  }
+  return ObjectDetector::create(std::move(*runner), network->metadata(), head_kind(config.head), config.person_class,
+                                thresholds(config));
+}
+
+Result<std::unique_ptr<ObjectDetector>> load_opencv(const DetectorConfig& config, const std::string& file) {
+  Result<std::unique_ptr<OpenCvNetwork>> engine = OpenCvNetwork::create(file);
+  if (!engine) {
+    return tl::unexpected<Error>(engine.error());
+  }
+  return ObjectDetector::create(std::move(*engine), {}, head_kind(config.head), config.person_class, thresholds(config));
+}
+
+/// Median of a few runs, the deadline far away.
+Result<TimeNs> measure(ObjectDetector& detector, ImageView<const std::uint8_t> bgr, const Clock& clock) {
+  Detections found;
+  std::vector<TimeNs> times;
+  for (int i = 0; i < kWarmUpRuns + kTimedRuns; ++i) {
+    const Result<RunOutcome> outcome = detector.detect(bgr, Deadline{&clock}, found);
+    if (!outcome) {
+      return tl::unexpected<Error>(outcome.error());
+    }
+    if (i >= kWarmUpRuns) {
+      times.push_back(std::max<TimeNs>(outcome->elapsed_ns, 1));
+    }
+  }
+  std::nth_element(times.begin(), times.begin() + kTimedRuns / 2, times.end());
+  return times[kTimedRuns / 2];
+}
+
+Error blame_config(const Error& error) {
+  return {ErrorCode::InvalidConfig, fmt::format("detector.models: {}", error.message)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const std::string& file) {
+  return config.engine == DetectorEngine::Posed ? load_own(config, file) : load_opencv(config, file);
+}
+
+Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorConfig& config, int image_width, int image_height,
+                                                               const Clock& clock) {
+  struct Loaded {
+    std::unique_ptr<ObjectDetector> model;
+    std::string name;
+    TimeNs unloaded_ns;
+  };
+  std::vector<std::uint8_t> grey(static_cast<std::size_t>(image_width) * static_cast<std::size_t>(image_height) * 3, 128);
+  const ImageView<const std::uint8_t> bgr{grey.data(), image_width, image_height, std::ptrdiff_t{3} * image_width, 3};
+  std::vector<Loaded> loaded;
+  for (const std::string& file : config.models) {
+    Result<std::unique_ptr<ObjectDetector>> model = load_object_detector(config, file);
+    if (!model) {
+      return tl::unexpected<Error>(blame_config(model.error()));
+    }
+    const Result<TimeNs> unloaded_ns = measure(**model, bgr, clock);
+    if (!unloaded_ns) {
+      return tl::unexpected<Error>(blame_config(unloaded_ns.error()));
+    }
+    loaded.push_back({std::move(*model), std::filesystem::path(file).filename().string(), *unloaded_ns});
+  }
+  if (loaded.empty()) {
+    return make_error(ErrorCode::InvalidConfig, "detector.models: is empty; name at least one, or set detector.enabled = false");
+  }
+  std::vector<std::unique_ptr<ObjectDetector>> models;
+  std::vector<std::string> names;
+  std::vector<TimeNs> unloaded_ns;
+  for (Loaded& l : loaded) {
+    models.push_back(std::move(l.model));
+    names.push_back(std::move(l.name));
+    // The order is the user's; a larger model that measured faster, by noise, is taken to be as fast as the one before it.
+    unloaded_ns.push_back(std::max(l.unloaded_ns, unloaded_ns.empty() ? TimeNs{0} : unloaded_ns.back()));
+  }
+  return std::unique_ptr<PersonDetector>(
+      new PersonDetector(from_seconds(config.budget_s), clock, std::move(models), std::move(names), std::move(unloaded_ns)));
+}
+
+PersonDetector::PersonDetector(TimeNs budget_ns, const Clock& clock, std::vector<std::unique_ptr<ObjectDetector>> models,
+                               std::vector<std::string> names, std::vector<TimeNs> unloaded_ns)
+    : budget_ns_(budget_ns),
+      clock_(clock),
+      models_(std::move(models)),
+      names_(std::move(names)),
+      unloaded_ns_(std::move(unloaded_ns)),
+      ladder_(unloaded_ns_, budget_ns) {}
+
+Result<DetectionOutcome> PersonDetector::detect(const RgbdFrame& frame, Detections& found) {
+  const std::size_t model = ladder_.rung();
+  Result<DetectionOutcome> outcome = run(frame, model, {&clock_, clock_.now_ns() + budget_ns_}, found);
+  if (outcome) {
+    outcome->overrun_ns = std::max<TimeNs>(outcome->elapsed_ns - budget_ns_, 0);
+    if (outcome->finished) {
+      ladder_.record_finished(model, outcome->elapsed_ns);
+    } else {
+      ladder_.record_abandoned(model, outcome->elapsed_ns);
+    }
+  }
+  return outcome;
+}
+
+Result<DetectionOutcome> PersonDetector::detect_unhurried(const RgbdFrame& frame, std::size_t model, Detections& found) {
+  return run(frame, std::min(model, models_.size() - 1), Deadline{&clock_}, found);
+}
+
+Result<DetectionOutcome> PersonDetector::run(const RgbdFrame& frame, std::size_t model, const Deadline& deadline,
+                                             Detections& found) {
+  const Result<RunOutcome> outcome = models_[model]->detect(frame.bgr, deadline, found);
+  if (!outcome) {
+    return tl::unexpected<Error>(outcome.error());
+  }
+  found.sequence = frame.sequence;
+  found.capture_ns = frame.capture_ns;
+  found.stamp_utc_ns = frame.stamp_utc_ns;
+  found.image_width = frame.bgr.width;
+  found.image_height = frame.bgr.height;
+  found.detect_ns = outcome->elapsed_ns;
+  found.model = static_cast<std::uint32_t>(model);
+  return DetectionOutcome{outcome->finished, model, outcome->elapsed_ns, 0, outcome->longest_step_ns};
+}
+
+}  // namespace posed

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/config.h"
+#include "core/clock.h"
+#include "core/detections.h"
+#include "core/image_view.h"
+#include "core/result.h"
+#include "core/rgbd_frame.h"
+#include "detect/object_detector.h"
+#include "detect/rung_ladder.h"
+
+namespace posed {
+
+/// What became of one frame.
+struct DetectionOutcome {
+  bool finished = false;       ///< false: the budget was spent, and nothing is known of this frame
+  std::size_t model = 0;       ///< that looked, or tried to
+  TimeNs elapsed_ns = 0;       ///< all of it
+  TimeNs overrun_ns = 0;       ///< past the budget; 0 within it
+  TimeNs longest_step_ns = 0;  ///< of this run: what bounds the overrun, but for what the scheduler adds
+};
+
+/// Finds people within a time budget: of the configured models it takes the largest that fits, and gives a frame up when the
+/// budget is spent. Thread-bound; everything is allocated by `create`.
+class PersonDetector {
+ public:
+  /// Loads the models and measures each on this machine, a few runs of a blank image of the given size. Errors: InvalidConfig,
+  /// which names `detector.models` and the file, where one cannot be used. `clock` must outlive it.
+  static Result<std::unique_ptr<PersonDetector>> create(const DetectorConfig& config, int image_width, int image_height,
+                                                        const Clock& clock);
+
+  /// In real time. Error: Unavailable, where an engine's library fails.
+  Result<DetectionOutcome> detect(const RgbdFrame& frame, Detections& found);
+
+  /// With a model of the caller's choice and as long as it takes, so that the outcome is a function of the image alone.
+  Result<DetectionOutcome> detect_unhurried(const RgbdFrame& frame, std::size_t model, Detections& found);
+
+  std::size_t model_count() const { return models_.size(); }
+  /// File name of a model without its folder.
+  const std::string& model_name(std::size_t model) const { return names_[model]; }
+  /// What a run of a model took when the detector was made.
+  TimeNs unloaded_ns(std::size_t model) const { return unloaded_ns_[model]; }
+
+ private:
+  PersonDetector(TimeNs budget_ns, const Clock& clock, std::vector<std::unique_ptr<ObjectDetector>> models,
+                 std::vector<std::string> names, std::vector<TimeNs> unloaded_ns);
+  Result<DetectionOutcome> run(const RgbdFrame& frame, std::size_t model, const Deadline& deadline, Detections& found);
+
+  TimeNs budget_ns_;
+  const Clock& clock_;
+  std::vector<std::unique_ptr<ObjectDetector>> models_;
+  std::vector<std::string> names_;
+  std::vector<TimeNs> unloaded_ns_;
+  RungLadder ladder_;
+};
+
+/// Makes one model ready as the configuration says: for tools that look at single images. Errors as in `PersonDetector::create`.
+Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const std::string& file);
+
+}  // namespace posed
