@@ -81,7 +81,9 @@ std::vector<T> from_raw(const std::string& raw, std::size_t count, const std::st
     throw OnnxRefusal{ErrorCode::BadData, fmt::format("constant '{}' has {} bytes for {} values", name, raw.size(), count)};
   }
   std::vector<T> values(count);
-  std::memcpy(values.data(), raw.data(), raw.size());
+  if (!raw.empty()) {  // memcpy takes no null pointer, also for nothing
+    std::memcpy(values.data(), raw.data(), raw.size());
+  }
   return values;
 }
 

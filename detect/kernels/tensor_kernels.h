@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 /// The loops of the network runner that are not oneDNN's. Tensors are interleaved (NHWC: all channels of a pixel side by side)
 /// unless called planar. Sizes are in elements; no pointer needs an alignment. All are reentrant; none allocates.
@@ -53,7 +54,10 @@ struct TensorKernels {
   void (*gate_pixels)(float* values, const float* gates, std::size_t pixels, std::size_t channels);
 };
 
-/// The kernels for the best instruction set of this machine.
+/// The kernels of each instruction set that this build contains and this machine runs, slowest first; never empty.
+std::span<const TensorKernels* const> supported_tensor_kernels();
+
+/// The last of them.
 const TensorKernels& tensor_kernels();
 
 }  // namespace posed
