@@ -1,7 +1,6 @@
 #include "detect/attention_block.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "detect/kernels/tensor_kernels.h"
 
@@ -27,10 +26,6 @@ void add_product(const std::vector<float>& matrix, const float* vector, std::siz
       out[i] += weights[i] * vector[row];
     }
   }
-}
-
-void sigmoid(float* values, std::size_t count) {
-  std::transform(values, values + count, values, [](float value) { return 1.0F / (1.0F + std::exp(-value)); });
 }
 
 }  // namespace
@@ -61,7 +56,7 @@ void AttentionBlock::channel_gates(const float* means, const float* maxima, floa
   std::transform(hidden, hidden + size, of_maxima, hidden, [](float a, float b) { return std::max(a, 0.0F) + std::max(b, 0.0F); });
   std::transform(cbam_.bias2.begin(), cbam_.bias2.end(), gates, [](float bias) { return 2 * bias; });
   add_product(cbam_.weights2, hidden, channels_, gates);
-  sigmoid(gates, channels_);
+  tensor_kernels().sigmoid(gates, channels_);
 }
 
 void AttentionBlock::run(const float* in, float* out, float* scratch) const {
@@ -90,7 +85,7 @@ void AttentionBlock::run(const float* in, float* out, float* scratch) const {
     const std::size_t first = y * plane_stride_;
     kernels.correlate_row(means + first, maxima + first, plane_stride_, cbam_.spatial_weights.data(),
                           static_cast<std::size_t>(cbam_.kernel), cbam_.spatial_bias, width_, row);
-    sigmoid(row, width_);
+    kernels.sigmoid(row, width_);
     kernels.gate_pixels(out + y * row_floats, row, width_, channels_);
   }
 }

@@ -18,6 +18,10 @@ inline void store(const Floats& values, float* to) {
   __builtin_memcpy(to, &values, sizeof values);
 }
 
+inline float larger(float a, float b) {
+  return a > b ? a : b;
+}
+
 /// Rounds a value that is already in steps from the zero point's zero.
 inline std::uint8_t to_u8(float value) {
   const float low = value < 0.0F ? 0.0F : value;
@@ -32,30 +36,72 @@ inline std::size_t first_element(int channel, int channels, int height, int widt
   return static_cast<std::size_t>(((channel % channels) * height + offset % 2) * width + offset / 2);
 }
 
+constexpr int kStemChannels = 12;  // of a colour image after SpaceToDepth
+constexpr int kChunk = 128;        // of a row's output pixels: what a row of bytes is prepared for at a time
+
+/// Output pixels [begin, end) of a row: channel c of pixel x is from[c][x * step]. Inlined where channels and step are constants,
+/// so that a pixel is a few loads and stores without a loop.
+inline __attribute__((always_inline)) void gather_floats(const float* const* from, int channels, int step, int width, float* out) {
+  for (int x = 0; x < width; ++x) {
+    for (int c = 0; c < channels; ++c) {
+      out[x * channels + c] = from[c][x * step];
+    }
+  }
+}
+
 void interleave(const float* __restrict planes, int channels, int height, int width, int step, float* __restrict out) {
   const int out_channels = channels * step * step;
+  const int out_width = width / step;
   for (int y = 0; y < height / step; ++y) {
-    float* const row = out + static_cast<std::size_t>(y * (width / step)) * static_cast<std::size_t>(out_channels);
+    float* const row = out + static_cast<std::size_t>(y * out_width) * static_cast<std::size_t>(out_channels);
+    const float* const in = planes + static_cast<std::size_t>(y * step * width);
+    if (out_channels == kStemChannels && step == 2) {
+      const float* from[kStemChannels];
+      for (int c = 0; c < kStemChannels; ++c) {
+        from[c] = in + first_element(c, channels, height, width);
+      }
+      gather_floats(from, kStemChannels, 2, out_width, row);
+      continue;
+    }
     for (int c = 0; c < out_channels; ++c) {
-      const float* const from = planes + first_element(c, channels, height, width) + static_cast<std::size_t>(y * step * width);
-      for (int x = 0; x < width / step; ++x) {
+      const float* const from = in + first_element(c, channels, height, width);
+      for (int x = 0; x < out_width; ++x) {
         row[x * out_channels + c] = from[x * step];
       }
     }
   }
 }
 
+/// Steps of `count` values: contiguous, so that the compiler vectorises it.
+inline void to_steps(const float* __restrict in, int count, float factor, float offset, std::uint8_t* __restrict out) {
+  for (int i = 0; i < count; ++i) {
+    out[i] = to_u8(in[i] * factor + offset);
+  }
+}
+
 void interleave_u8(const float* __restrict planes, int channels, int height, int width, int step, Quantization to,
                    std::uint8_t* __restrict out) {
   const int out_channels = channels * step * step;
+  const int out_width = width / step;
   const float factor = 1.0F / to.scale;
   const auto offset = static_cast<float>(to.zero_point);
+  std::uint8_t steps[2 * kChunk];
   for (int y = 0; y < height / step; ++y) {
-    std::uint8_t* const row = out + static_cast<std::size_t>(y * (width / step)) * static_cast<std::size_t>(out_channels);
-    for (int c = 0; c < out_channels; ++c) {
-      const float* const from = planes + first_element(c, channels, height, width) + static_cast<std::size_t>(y * step * width);
-      for (int x = 0; x < width / step; ++x) {
-        row[x * out_channels + c] = to_u8(from[x * step] * factor + offset);
+    std::uint8_t* const row = out + static_cast<std::size_t>(y * out_width) * static_cast<std::size_t>(out_channels);
+    for (int first = 0; first < out_width; first += kChunk) {
+      const int count = out_width - first < kChunk ? out_width - first : kChunk;
+      for (int c = 0; c < channels * step; ++c) {
+        // One row of one plane holds the values of `step` output channels in turn.
+        const int plane = c % channels;
+        const int in_row = c / channels;
+        to_steps(planes + static_cast<std::size_t>((plane * height + y * step + in_row) * width + first * step), count * step,
+                 factor, offset, steps);
+        for (int column = 0; column < step; ++column) {
+          std::uint8_t* const to_channel = row + first * out_channels + (column * step + in_row) * channels + plane;
+          for (int x = 0; x < count; ++x) {
+            to_channel[x * out_channels] = steps[x * step + column];
+          }
+        }
       }
     }
   }
@@ -151,7 +197,7 @@ void channel_statistics(const float* __restrict in, std::size_t pixels, std::siz
     const float* const pixel = in + p * channels;
     for (std::size_t c = 0; c < channels; ++c) {
       sums[c] += pixel[c];
-      maxima[c] = pixel[c] > maxima[c] ? pixel[c] : maxima[c];
+      maxima[c] = larger(pixel[c], maxima[c]);
     }
   }
 }
@@ -175,34 +221,93 @@ void gate_channels(const float* __restrict in, const float* __restrict gates, st
         sums += values;
         best = values > best ? values : best;
       }
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        sum += sums[lane];
-        maximum = best[lane] > maximum ? best[lane] : maximum;
-      }
+      // Pairwise, so that no addition waits for all before it.
+      const float s[4] = {sums[0] + sums[4], sums[1] + sums[5], sums[2] + sums[6], sums[3] + sums[7]};
+      const float m[4] = {larger(best[0], best[4]), larger(best[1], best[5]), larger(best[2], best[6]), larger(best[3], best[7])};
+      sum = (s[0] + s[2]) + (s[1] + s[3]);
+      maximum = larger(larger(m[0], m[2]), larger(m[1], m[3]));
     }
     for (std::size_t c = whole; c < channels; ++c) {
       y[c] = x[c] * gates[c];
       sum += y[c];
-      maximum = y[c] > maximum ? y[c] : maximum;
+      maximum = larger(y[c], maximum);
     }
     means[p] = sum * inverse;
     maxima[p] = maximum;
   }
 }
 
-void correlate_row(const float* __restrict means, const float* __restrict maxima, std::size_t stride,
-                   const float* __restrict weights, std::size_t kernel, float bias, std::size_t width, float* __restrict out) {
-  for (std::size_t x = 0; x < width; ++x) {
-    out[x] = bias;
+/// `blocks` vectors of results side by side, all sums in registers; inlined with a constant.
+inline __attribute__((always_inline)) void correlate_blocks(const float* means, const float* maxima, std::size_t stride,
+                                                            const float* weights, std::size_t kernel, float bias, int blocks,
+                                                            float* out) {
+  Floats sums[4];
+  for (int block = 0; block < blocks; ++block) {
+    sums[block] = Floats{} + bias;
   }
   for (std::size_t plane = 0; plane < 2; ++plane) {
-    for (std::size_t i = 0; i < kernel * kernel; ++i) {
-      const float* const from = (plane == 0 ? means : maxima) + (i / kernel) * stride + i % kernel;
-      const float weight = weights[plane * kernel * kernel + i];
-      for (std::size_t x = 0; x < width; ++x) {
-        out[x] += weight * from[x];
+    const float* const of_plane = weights + plane * kernel * kernel;
+    for (std::size_t i = 0; i < kernel; ++i) {
+      const float* const from = (plane == 0 ? means : maxima) + i * stride;
+      for (std::size_t j = 0; j < kernel; ++j) {
+        const Floats weight = Floats{} + of_plane[i * kernel + j];
+        for (int block = 0; block < blocks; ++block) {
+          sums[block] += weight * load(from + j + static_cast<std::size_t>(block) * kLanes);
+        }
       }
     }
+  }
+  for (int block = 0; block < blocks; ++block) {
+    store(sums[block], out + static_cast<std::size_t>(block) * kLanes);
+  }
+}
+
+void correlate_row(const float* means, const float* maxima, std::size_t stride, const float* weights, std::size_t kernel,
+                   float bias, std::size_t width, float* out) {
+  std::size_t x = 0;
+  for (; x + 4 * kLanes <= width; x += 4 * kLanes) {
+    correlate_blocks(means + x, maxima + x, stride, weights, kernel, bias, 4, out + x);
+  }
+  for (; x + kLanes <= width; x += kLanes) {
+    correlate_blocks(means + x, maxima + x, stride, weights, kernel, bias, 1, out + x);
+  }
+  for (; x < width; ++x) {
+    float sum = bias;
+    for (std::size_t i = 0; i < kernel * kernel; ++i) {
+      const std::size_t place = (i / kernel) * stride + x + i % kernel;
+      sum += weights[i] * means[place] + weights[kernel * kernel + i] * maxima[place];
+    }
+    out[x] = sum;
+  }
+}
+
+/// exp(x) for x in [-87, 87] as 2^n exp(r), |r| <= ln(2) / 2, with the Taylor series of exp(r): relative error below 3e-7.
+inline float exponential(float x) {
+  constexpr float kLog2E = 1.44269504F;
+  constexpr float kLn2High = 0.693359375F;  // few enough bits that its product with n is exact
+  constexpr float kLn2Low = -2.12194440e-4F;
+  const float low = x < -87.0F ? -87.0F : x;
+  const float inside = low > 87.0F ? 87.0F : low;
+  const auto n = static_cast<std::int32_t>(inside * kLog2E + 126.5F) - 126;  // rounds, as what it truncates is positive
+  const auto whole = static_cast<float>(n);
+  const float r = (inside - whole * kLn2High) - whole * kLn2Low;
+  float series = 1.0F / 5040;
+  series = series * r + 1.0F / 720;
+  series = series * r + 1.0F / 120;
+  series = series * r + 1.0F / 24;
+  series = series * r + 1.0F / 6;
+  series = series * r + 0.5F;
+  series = series * r + 1.0F;
+  series = series * r + 1.0F;
+  const std::int32_t bits = (n + 127) << 23;
+  float power = 0;
+  __builtin_memcpy(&power, &bits, sizeof power);
+  return series * power;
+}
+
+void sigmoid(float* __restrict values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    values[i] = 1.0F / (1.0F + exponential(-values[i]));
   }
 }
 
@@ -221,6 +326,6 @@ void gate_pixels(float* __restrict values, const float* __restrict gates, std::s
 extern const TensorKernels POSED_KERNELS;
 const TensorKernels POSED_KERNELS = {interleave,    interleave_u8, deinterleave, concat,     upsample2x,
                                      add,           add_u8,        quantize,     dequantize, channel_statistics,
-                                     gate_channels, correlate_row, gate_pixels};
+                                     gate_channels, correlate_row, sigmoid,      gate_pixels};
 
 }  // namespace posed

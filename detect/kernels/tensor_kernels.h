@@ -50,6 +50,9 @@ struct TensorKernels {
   void (*correlate_row)(const float* means, const float* maxima, std::size_t stride, const float* weights, std::size_t kernel,
                         float bias, std::size_t width, float* out);
 
+  /// In place, to 1e-6.
+  void (*sigmoid)(float* values, std::size_t count);
+
   /// values *= gates[pixel].
   void (*gate_pixels)(float* values, const float* gates, std::size_t pixels, std::size_t channels);
 };

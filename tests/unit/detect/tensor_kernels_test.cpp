@@ -41,7 +41,7 @@ int rounded(float value) {
 TEST_P(TensorKernelsOf, InterleavesAndSplitsImages) {
   constexpr int kChannels = 3;
   constexpr int kHeight = 6;
-  constexpr int kWidth = 10;
+  constexpr int kWidth = 290;  // more than one chunk of a row
   const std::vector<float> planes = random_floats(kChannels * kHeight * kWidth);
   for (const int step : {1, 2}) {
     std::vector<float> out(planes.size());
@@ -188,6 +188,20 @@ TEST_P(TensorKernelsOf, GatesChannelsAndPixels) {
     for (std::size_t i = 0; i < out.size(); ++i) {
       ASSERT_EQ(out[i], before[i] * pixel_gates[i / channels]);
     }
+  }
+}
+
+TEST_P(TensorKernelsOf, SigmoidIsExactEnoughEverywhere) {
+  std::vector<float> values;
+  for (float x = -30; x < 30; x += 0.0137F) {
+    values.push_back(x);
+  }
+  values.insert(values.end(), {-1e30F, -100, -0.0F, 100, 1e30F});
+  std::vector<float> result = values;
+  kernels().sigmoid(result.data(), result.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double expected = 1 / (1 + std::exp(-static_cast<double>(values[i])));
+    ASSERT_NEAR(result[i], expected, 1e-6 * expected + 1e-37) << values[i];
   }
 }
 
