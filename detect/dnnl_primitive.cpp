@@ -10,15 +10,15 @@ namespace posed {
 namespace {
 
 using dnnl::memory;
-using data_type = memory::data_type;
-using tag = memory::format_tag;
+using DataType = memory::data_type;
+using Tag = memory::format_tag;
 
 memory::dims dims_of(const TensorShape& shape) {
   return {1, shape.channels, shape.height, shape.width};
 }
 
 memory::desc desc_of(const TensorView& view) {
-  return {dims_of(view.shape), view.quantization ? data_type::u8 : data_type::f32, tag::nhwc};
+  return {dims_of(view.shape), view.quantization ? DataType::u8 : DataType::f32, Tag::nhwc};
 }
 
 memory::dims weight_dims(const Convolution& operation, int in_channels) {
@@ -110,8 +110,8 @@ void DnnlFactory::finish(DnnlPrimitive& primitive, const memory::desc& scratchpa
 }
 
 memory DnnlFactory::packed_weights(const Convolution& operation, const TensorView& in, const memory::desc& layout,
-                                   const void* values, data_type type) {
-  const memory::desc plain(weight_dims(operation, in.shape.channels), type, operation.groups == 1 ? tag::oihw : tag::goihw);
+                                   const void* values, DataType type) {
+  const memory::desc plain(weight_dims(operation, in.shape.channels), type, operation.groups == 1 ? Tag::oihw : Tag::goihw);
   memory from(plain, engine_, const_cast<void*>(values));  // NOLINT(cppcoreguidelines-pro-type-const-cast): oneDNN only reads it
   memory to(layout, engine_);
   dnnl::reorder(from, to).execute(stream_, from, to);
@@ -133,8 +133,8 @@ DnnlPrimitive DnnlFactory::convolution(const Convolution& operation, const Tenso
   }
   const memory::dims strides{operation.stride, operation.stride};
   const memory::dims padding{operation.padding, operation.padding};
-  const memory::desc weights(weight_dims(operation, in.shape.channels), int8 ? data_type::s8 : data_type::f32, tag::any);
-  const memory::desc bias_desc({operation.out_channels}, data_type::f32, tag::x);
+  const memory::desc weights(weight_dims(operation, in.shape.channels), int8 ? DataType::s8 : DataType::f32, Tag::any);
+  const memory::desc bias_desc({operation.out_channels}, DataType::f32, Tag::x);
   const dnnl::convolution_forward::primitive_desc chosen(
       dnnl::convolution_forward::desc(dnnl::prop_kind::forward_inference, dnnl::algorithm::convolution_direct, desc_of(in), weights,
                                       bias_desc, desc_of(out), strides, padding, padding),
@@ -144,8 +144,8 @@ DnnlPrimitive DnnlFactory::convolution(const Convolution& operation, const Tenso
   primitive.primitive_ = dnnl::convolution_forward(chosen);
   add_argument(primitive, DNNL_ARG_SRC, memory_of(in));
   add_argument(primitive, DNNL_ARG_WEIGHTS,
-               int8 ? packed_weights(operation, in, chosen.weights_desc(), quantized.values.data(), data_type::s8)
-                    : packed_weights(operation, in, chosen.weights_desc(), operation.weights.data(), data_type::f32));
+               int8 ? packed_weights(operation, in, chosen.weights_desc(), quantized.values.data(), DataType::s8)
+                    : packed_weights(operation, in, chosen.weights_desc(), operation.weights.data(), DataType::f32));
   memory bias_memory(bias_desc, engine_);
   std::copy(bias.begin(), bias.end(), static_cast<float*>(bias_memory.get_data_handle()));
   add_argument(primitive, DNNL_ARG_BIAS, std::move(bias_memory));

@@ -1,10 +1,11 @@
 # The runner's own kernels, compiled once for each instruction set; posed_detect contains the objects.
-# posed_detect_kernels(TABLE FLAGS ...): they are hot, so also development builds optimise them.
+# posed_detect_kernels(TABLE FLAGS ...): they are hot, so also development builds optimise them. Nothing here asks for floating-point
+# exceptions, and clamping without branches is what vectorises.
 function(posed_detect_kernels table)
   add_library(posed_detect_${table} OBJECT kernels/tensor_kernels.cpp)
   target_link_libraries(posed_detect_${table} PRIVATE posed_options)
   target_compile_definitions(posed_detect_${table} PRIVATE POSED_KERNELS=${table})
-  target_compile_options(posed_detect_${table} PRIVATE -O3 ${ARGN})
+  target_compile_options(posed_detect_${table} PRIVATE -O3 -fno-trapping-math ${ARGN})
 endfunction()
 
 # gcc remarks that a vector would be passed otherwise with other flags; the functions that pass vectors are inlined.

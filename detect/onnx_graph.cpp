@@ -35,15 +35,15 @@ std::int64_t int_attribute(const onnx::NodeProto& node, std::string_view name, s
   return attribute == nullptr ? otherwise : attribute->i();
 }
 
-std::string string_attribute(const onnx::NodeProto& node, std::string_view name, std::string otherwise) {
+std::string string_attribute(const onnx::NodeProto& node, std::string_view name, std::string_view otherwise) {
   const onnx::AttributeProto* attribute = find_attribute(node, name);
-  return attribute == nullptr ? std::move(otherwise) : attribute->s();
+  return attribute == nullptr ? std::string(otherwise) : attribute->s();
 }
 
-std::vector<std::int64_t> ints_attribute(const onnx::NodeProto& node, std::string_view name, std::vector<std::int64_t> otherwise) {
+std::vector<std::int64_t> ints_attribute(const onnx::NodeProto& node, std::string_view name,
+                                         const std::vector<std::int64_t>& otherwise) {
   const onnx::AttributeProto* attribute = find_attribute(node, name);
-  return attribute == nullptr ? std::move(otherwise)
-                              : std::vector<std::int64_t>(attribute->ints().begin(), attribute->ints().end());
+  return attribute == nullptr ? otherwise : std::vector<std::int64_t>(attribute->ints().begin(), attribute->ints().end());
 }
 
 int to_int(const onnx::NodeProto& node, std::int64_t value) {

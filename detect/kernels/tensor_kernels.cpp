@@ -37,6 +37,7 @@ inline std::size_t first_element(int channel, int channels, int height, int widt
 }
 
 constexpr int kStemChannels = 12;  // of a colour image after SpaceToDepth
+constexpr int kStemRows = 6;       // of the image's three planes, for one row after SpaceToDepth
 constexpr int kChunk = 128;        // of a row's output pixels: what a row of bytes is prepared for at a time
 
 /// Output pixels [begin, end) of a row: channel c of pixel x is from[c][x * step]. Inlined where channels and step are constants,
@@ -79,29 +80,46 @@ inline void to_steps(const float* __restrict in, int count, float factor, float 
   }
 }
 
+/// Interleaves rows of a stem: planes of the even row, then of the odd one; even and odd columns in turn.
+inline void gather_stem(const std::uint8_t (*steps)[2 * kChunk], int count, std::uint8_t* __restrict out) {
+  for (int x = 0; x < count; ++x) {
+    for (int column = 0; column < 2; ++column) {
+      for (int i = 0; i < kStemRows; ++i) {
+        out[x * kStemChannels + column * kStemRows + i] = steps[i][2 * x + column];
+      }
+    }
+  }
+}
+
 void interleave_u8(const float* __restrict planes, int channels, int height, int width, int step, Quantization to,
                    std::uint8_t* __restrict out) {
   const int out_channels = channels * step * step;
   const int out_width = width / step;
   const float factor = 1.0F / to.scale;
   const auto offset = static_cast<float>(to.zero_point);
-  std::uint8_t steps[2 * kChunk];
+  const bool is_stem = out_channels == kStemChannels && step == 2;
+  std::uint8_t steps[kStemRows][2 * kChunk];
   for (int y = 0; y < height / step; ++y) {
     std::uint8_t* const row = out + static_cast<std::size_t>(y * out_width) * static_cast<std::size_t>(out_channels);
     for (int first = 0; first < out_width; first += kChunk) {
       const int count = out_width - first < kChunk ? out_width - first : kChunk;
-      for (int c = 0; c < channels * step; ++c) {
-        // One row of one plane holds the values of `step` output channels in turn.
-        const int plane = c % channels;
-        const int in_row = c / channels;
+      std::uint8_t* const pixels = row + first * out_channels;
+      // One row of one plane holds the values of `step` output channels in turn.
+      for (int i = 0; i < channels * step; ++i) {
+        const int plane = i % channels;
+        const int in_row = i / channels;
+        std::uint8_t* const of_row = steps[is_stem ? i : 0];
         to_steps(planes + static_cast<std::size_t>((plane * height + y * step + in_row) * width + first * step), count * step,
-                 factor, offset, steps);
-        for (int column = 0; column < step; ++column) {
-          std::uint8_t* const to_channel = row + first * out_channels + (column * step + in_row) * channels + plane;
+                 factor, offset, of_row);
+        for (int column = 0; column < step && !is_stem; ++column) {
+          std::uint8_t* const to_channel = pixels + (column * step + in_row) * channels + plane;
           for (int x = 0; x < count; ++x) {
-            to_channel[x * out_channels] = steps[x * step + column];
+            to_channel[x * out_channels] = of_row[x * step + column];
           }
         }
+      }
+      if (is_stem) {
+        gather_stem(steps, count, pixels);
       }
     }
   }

@@ -61,7 +61,8 @@ Status ModelImages::fill(std::size_t index, std::span<float> input) {
   const auto pixels = static_cast<std::size_t>(header->width) * static_cast<std::size_t>(header->height);
   bgr_.resize(kColorChannels * pixels);
   gray_.resize(pixels);
-  const ImageView<std::uint8_t> bgr{bgr_.data(), header->width, header->height, kColorChannels * header->width, kColorChannels};
+  const ImageView<std::uint8_t> bgr{bgr_.data(), header->width, header->height, std::ptrdiff_t{kColorChannels} * header->width,
+                                    kColorChannels};
   const ImageView<std::uint8_t> gray{gray_.data(), header->width, header->height, header->width, 1};
   if (const Status decoded = decoder_.read_color(paths_[index], bgr, gray); !decoded) {
     return decoded;
