@@ -23,6 +23,20 @@ set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION "${LCM_LIBRARY}" INT
 pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET libsystemd)
 find_program(LCM_GEN lcm-gen REQUIRED)
 
+# The detector. oneDNN's own CMake configuration asks for OpenCL's development files, which nothing here needs; the ONNX library has
+# the classes of the format's messages, all that is used of it.
+find_path(DNNL_INCLUDE_DIR oneapi/dnnl/dnnl.hpp REQUIRED)
+find_library(DNNL_LIBRARY dnnl REQUIRED)
+add_library(dnnl::dnnl UNKNOWN IMPORTED)
+set_target_properties(dnnl::dnnl PROPERTIES IMPORTED_LOCATION "${DNNL_LIBRARY}" INTERFACE_INCLUDE_DIRECTORIES "${DNNL_INCLUDE_DIR}")
+find_path(ONNX_INCLUDE_DIR onnx/onnx_pb.h REQUIRED)
+find_library(ONNX_PROTO_LIBRARY onnx_proto REQUIRED)
+pkg_check_modules(PROTOBUF REQUIRED IMPORTED_TARGET protobuf)
+add_library(onnx::proto UNKNOWN IMPORTED)
+set_target_properties(onnx::proto PROPERTIES
+  IMPORTED_LOCATION "${ONNX_PROTO_LIBRARY}" INTERFACE_INCLUDE_DIRECTORIES "${ONNX_INCLUDE_DIR}"
+  INTERFACE_COMPILE_DEFINITIONS "ONNX_ML=1;ONNX_NAMESPACE=onnx" INTERFACE_LINK_LIBRARIES PkgConfig::PROTOBUF)
+
 # Debian puts OpenCV's CMake configuration into the package of all modules, which pulls in Qt, VTK and GDAL; the core module with its
 # universal intrinsics is all that the daemon needs, so it is found by hand.
 find_path(OPENCV_INCLUDE_DIR opencv2/core/hal/intrin.hpp PATH_SUFFIXES opencv4 REQUIRED)

@@ -13,6 +13,8 @@
 
 namespace posed {
 
+struct RunnerProgram;
+
 enum class Precision : std::uint8_t {
   Float32,
   Int8,  ///< activations of 8 bits with a scale and a zero point each, weights of 8 bits with a scale each output channel
@@ -56,10 +58,9 @@ class NetworkRunner final : public InferenceEngine {
   Status run_observed(const TensorObserver& observer);
 
  private:
-  struct Program;
-  explicit NetworkRunner(std::unique_ptr<Program> program);
+  explicit NetworkRunner(std::unique_ptr<RunnerProgram> program);
 
-  std::unique_ptr<Program> program_;
+  std::unique_ptr<RunnerProgram> program_;
 };
 
 }  // namespace posed

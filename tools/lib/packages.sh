@@ -19,7 +19,11 @@ posed_build_packages=(
   "libtomlplusplus-dev|TOML configuration files"
   "libcli11-dev|command lines"
   "libsystemd-dev|event loop and service notification"
-  "nlohmann-json3-dev|JSON statistics"
+  "nlohmann-json3-dev|JSON statistics, metadata of networks"
+  "libdnnl-dev|oneDNN, the detector's network primitives"
+  "libonnx-dev|ONNX message classes"
+  "libprotobuf-dev|Protocol Buffers, which ONNX files are"
+  "libopencv-dnn-dev|second engine for networks"
 )
 
 posed_demo_packages=(
