@@ -37,9 +37,10 @@ void check_rules(StrictReader& reader, const Config& c) {
                              c.mapper.recovery_keyframes, c.mapper.max_keyframes));
   reader.require(c.map.mode != MapMode::Localization || !c.map.file.empty(), {"map.mode", "map.file"},
                  "needs map.file, the map to localize in");
-  reader.require(c.pipeline.frame_slots >= c.pipeline.frame_queue + 2, {"pipeline.frame_slots", "pipeline.frame_queue"},
-                 fmt::format("pipeline.frame_slots ({}) must be at least pipeline.frame_queue ({}) + 2", c.pipeline.frame_slots,
-                             c.pipeline.frame_queue));
+  const int needed = c.pipeline.frame_queue + 2 + (c.detector.enabled ? 3 : 0);
+  reader.require(c.pipeline.frame_slots >= needed, {"pipeline.frame_slots", "pipeline.frame_queue"},
+                 fmt::format("pipeline.frame_slots ({}) must be at least pipeline.frame_queue ({}) + {}", c.pipeline.frame_slots,
+                             c.pipeline.frame_queue, needed - c.pipeline.frame_queue));
 }
 
 void check_thread(StrictReader& reader, const std::string& section, const ThreadConfig& thread) {

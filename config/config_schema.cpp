@@ -255,7 +255,7 @@ void add_thread(SchemaBuilder& schema, const std::string& thread, std::string_vi
 void add_pipeline(SchemaBuilder& schema, PipelineConfig& c) {
   schema.section("pipeline", "Buffers between the threads. All are allocated at start.")
       .key("frame_slots", integer(c.frame_slots, 3, 256), "frames",
-           "Frames in memory. At least `frame_queue` + 2: one is being filled and one is being tracked.")
+           "Frames in memory. At least `frame_queue` + 2, since one is being filled and one tracked, and 3 more for the detector.")
       .key("frame_queue", integer(c.frame_queue, 1, 64), "frames",
            "Frames that wait for the tracker; when full the oldest is dropped.")
       .key("keyframe_queue", integer(c.keyframe_queue, 1, 64), "keyframes",

@@ -24,6 +24,12 @@ Result<std::unique_ptr<App>> App::create(const Config& config, AppOptions option
   parts.source = std::move(*source);
   parts.tracker = make_frame_tracker(config);
   parts.mapper = make_keyframe_mapper(config);
+  const SourceInfo& info = parts.source->info();
+  Result<std::unique_ptr<FrameDetector>> detector = make_frame_detector(config.detector, info.width, info.height, clock);
+  if (!detector) {
+    return tl::unexpected<Error>(detector.error());
+  }
+  parts.detector = std::move(*detector);
   if (options.publish) {
     parts.transport = std::make_unique<LcmTransport>(config.publisher.url);
   }

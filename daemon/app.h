@@ -7,6 +7,7 @@
 
 #include "config/config.h"
 #include "core/clock.h"
+#include "core/detections.h"
 #include "core/estimates.h"
 #include "core/result.h"
 #include "core/se3.h"
@@ -30,15 +31,18 @@ struct AppOptions {
   /// Called for every frame the tracker processed, in order, after it was published, on the publisher thread. May block for short
   /// (in lockstep nothing is lost; in real time the queue before the publisher overflows and counts).
   std::function<void(const PoseEstimate&)> on_estimate;
+  /// Called for every frame the detector has looked at, in order, likewise.
+  std::function<void(const Detections&)> on_detections;
   /// Called when the source skips a bad frame or fails, on the capture thread, with the reason.
   std::function<void(const Error&)> on_source_error;
   std::optional<MapFiles> map_files;  ///< instead of those of the configuration
 };
 
-/// The pipeline: the one place that owns the threads and wires source, tracker, mapper and publisher together (docs/threads.md).
-/// The daemon and `posectl replay` run this same class. With Pacing::Realtime every stage has its own thread. With Pacing::Lockstep
-/// capture, tracking and mapping take turns on one thread, so that nothing is dropped and the result is a function of the input
-/// alone. Thread-bound to the thread that made it, but for `health` and `request_map_save`, which are thread-safe.
+/// The pipeline: the one place that owns the threads and wires source, detector, tracker, mapper and publisher together
+/// (docs/threads.md). The daemon and `posectl replay` run this same class. With Pacing::Realtime every stage has its own thread.
+/// With Pacing::Lockstep capture, detection, tracking and mapping take turns on one thread, so that nothing is dropped and the
+/// result is a function of the input alone. Thread-bound to the thread that made it, but for `health` and `request_map_save`, which
+/// are thread-safe.
 class App {
  public:
   /// Opens the source, allocates everything and loads the map. Nothing runs yet. A map that cannot be used is an error

@@ -42,12 +42,13 @@ bool CaptureStage::next(const std::stop_token& stop, FrameRef& frame) {
   return false;
 }
 
-void CaptureStage::run(const std::stop_token& stop, FrameLink& out) {
+void CaptureStage::run(const std::stop_token& stop, FrameLink& out, NewestFrameLink& newest) {
   bool more = begin();
   while (more && !stop.stop_requested()) {
     FrameRef frame;
     more = next(stop, frame);
     if (frame) {
+      newest.push(frame);
       if (const std::optional<FrameRef> oldest = out.ring.push(std::move(frame))) {
         dropped_.add();
       }
@@ -55,6 +56,7 @@ void CaptureStage::run(const std::stop_token& stop, FrameLink& out) {
     }
   }
   out.close();
+  newest.close();
 }
 
 void CaptureStage::report(HealthReport& health) const {

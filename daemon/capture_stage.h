@@ -26,8 +26,9 @@ class CaptureStage {
   /// The source's next frame, into `frame`, which is empty where this one was lost; false at the end, on failure and on `stop`.
   bool next(const std::stop_token& stop, FrameRef& frame);
 
-  /// The thread's body in real time: every frame goes into `out`, whose oldest makes way, and `out` is closed at the end.
-  void run(const std::stop_token& stop, FrameLink& out);
+  /// The thread's body in real time: every frame goes into `out`, whose oldest makes way, and is the newest in `newest`; both are
+  /// closed at the end.
+  void run(const std::stop_token& stop, FrameLink& out, NewestFrameLink& newest);
 
   void report(HealthReport& health) const;
 

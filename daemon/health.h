@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "core/estimates.h"
 #include "core/metrics.h"
@@ -36,9 +37,17 @@ struct HealthReport {
   std::uint64_t map_saves = 0;
   std::uint64_t map_save_errors = 0;
 
-  LatencySummary track;    ///< time in the tracker a frame
-  LatencySummary latency;  ///< capture to publish
-  LatencySummary map;      ///< time in the mapper a keyframe
+  std::string detector_model;              ///< file name of the model used last; empty: nobody is looked for
+  std::uint64_t detected = 0;              ///< frames the detector has looked at
+  std::uint64_t detections_abandoned = 0;  ///< frames given up because the budget was spent
+  std::uint64_t detections_dropped = 0;    ///< handed back by the full queue before the publisher
+  std::uint64_t detector_errors = 0;       ///< frames on which its library failed
+
+  LatencySummary track;           ///< time in the tracker a frame
+  LatencySummary latency;         ///< capture to publish
+  LatencySummary map;             ///< time in the mapper a keyframe
+  LatencySummary detect;          ///< time in the detector a frame, those given up included
+  LatencySummary detect_overrun;  ///< past the budget, of the frames that took longer
   std::uint64_t peak_rss_bytes = 0;
 };
 

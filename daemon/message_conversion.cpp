@@ -106,6 +106,28 @@ std::optional<bot_core::pose_t> to_bot_core_pose(const PoseEstimate& estimate, c
   return message;
 }
 
+detections_t to_detections_message(const Detections& detections, TimeNs publish_ns) {
+  detections_t message;
+  message.utime = detections.stamp_utc_ns / kNsPerUs;
+  message.capture_mono_ns = detections.capture_ns;
+  message.publish_mono_ns = publish_ns;
+  message.sequence = static_cast<std::int64_t>(detections.sequence);
+  message.image_width = detections.image_width;
+  message.image_height = detections.image_height;
+  message.count = static_cast<std::int32_t>(detections.count);
+  for (const Detection& found : detections.found()) {
+    detection_t person;
+    person.label = "person";
+    person.score = found.score;
+    person.x_min = found.box.x_min;
+    person.y_min = found.box.y_min;
+    person.x_max = found.box.x_max;
+    person.y_max = found.box.y_max;
+    message.detections.push_back(person);
+  }
+  return message;
+}
+
 status_t to_status_message(const HealthReport& health, const StatusOrigin& origin) {
   const auto count = [](std::uint64_t n) { return static_cast<std::int64_t>(n); };
   status_t message;
@@ -135,10 +157,17 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.loops_closed = count(health.loops_closed);
   message.maps_joined = count(health.maps_joined);
   message.relocalizations = count(health.relocalizations);
+  message.detector_model = health.detector_model;
+  message.detected = count(health.detected);
+  message.detections_abandoned = count(health.detections_abandoned);
+  message.detections_dropped = count(health.detections_dropped);
+  message.detector_errors = count(health.detector_errors);
   message.peak_rss_bytes = count(health.peak_rss_bytes);
   message.track = to_message(health.track);
   message.latency = to_message(health.latency);
   message.map = to_message(health.map);
+  message.detect = to_message(health.detect);
+  message.detect_overrun = to_message(health.detect_overrun);
   return message;
 }
 

@@ -5,10 +5,12 @@
 #include <string_view>
 
 #include <bot_core/pose_t.hpp>
+#include <posed/detections_t.hpp>
 #include <posed/pose_t.hpp>
 #include <posed/status_t.hpp>
 
 #include "core/clock.h"
+#include "core/detections.h"
 #include "core/estimates.h"
 #include "core/se3.h"
 #include "daemon/health.h"
@@ -21,6 +23,8 @@ pose_t to_pose_message(const PoseEstimate& estimate, const Se3& T_base_camera, T
 
 /// T_map_base; nothing where the estimate has no pose, for this type cannot say so.
 std::optional<bot_core::pose_t> to_bot_core_pose(const PoseEstimate& estimate, const Se3& T_base_camera);
+
+detections_t to_detections_message(const Detections& detections, TimeNs publish_ns);
 
 /// Where and when a report was made.
 struct StatusOrigin {

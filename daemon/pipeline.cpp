@@ -14,6 +14,7 @@
 #include "core/thread.h"
 #include "core/wake_event.h"
 #include "daemon/capture_stage.h"
+#include "daemon/detection_stage.h"
 #include "daemon/map_requests.h"
 #include "daemon/map_saver.h"
 #include "daemon/mapping_stage.h"
@@ -34,12 +35,15 @@ ThreadOptions thread_options(std::string name, const ThreadConfig& config) {
   return {std::move(name), policy, config.priority, config.cpus};
 }
 
+constexpr std::size_t kDetectionsQueue = 8;  // frames; a publisher that is further behind shows only the newest
+
 /// What crosses threads, at its working size before they run.
 struct Links {
   explicit Links(const Config& config)
       : frames(size_of(config.pipeline.frame_queue)),
         keyframes(size_of(config.pipeline.keyframe_queue)),
-        estimates(size_of(config.pipeline.publish_queue)) {
+        estimates(size_of(config.pipeline.publish_queue)),
+        detections(kDetectionsQueue) {
     keyframes.ring.prepare([&](KeyframeRecord& record) { record.reserve(feature_capacity(config.tracker.features)); });
     snapshots.prepare([&](MapSnapshot& snapshot) {
       snapshot.landmarks.reserve(size_of(config.mapper.local_landmarks));
@@ -51,12 +55,16 @@ struct Links {
     frames.wake_all();
     keyframes.wake_all();
     estimates.wake_all();
+    newest_frame.wake();
+    detections.wake_all();
   }
 
   FrameLink frames;
+  NewestFrameLink newest_frame;
   KeyframeLink keyframes;
   LatestValue<MapSnapshot> snapshots;
   EstimateLink estimates;
+  DetectionsLink detections;
 };
 
 class Pipeline final : public App {
@@ -73,7 +81,9 @@ class Pipeline final : public App {
         saver_(*parts_.mapper, options.map_files.value_or(map_files(config.map)),
                is_lockstep() ? 0 : from_seconds(config.map.save_period_s), clock),
         mapping_(*parts_.mapper, links_.keyframes, links_.snapshots, saver_, clock),
-        publish_(links_.estimates, make_publisher(clock), std::move(options.on_estimate), clock) {}
+        detection_(parts_.detector.get(), links_.newest_frame, links_.detections, [this] { links_.estimates.wake_all(); }),
+        publish_({links_.estimates, links_.detections}, make_publisher(clock),
+                 {std::move(options.on_estimate), std::move(options.on_detections)}, clock) {}
 
   ~Pipeline() override {
     stop();
@@ -136,6 +146,7 @@ class Pipeline final : public App {
     capture_.report(health);
     tracking_.report(health);
     mapping_.report(health);
+    detection_.report(health);
     publish_.report(health);
     health.peak_rss_bytes = peak_rss_bytes();
     return health;
@@ -184,19 +195,29 @@ class Pipeline final : public App {
     threads_[1] = NamedThread(thread_options("mapper", pipeline.mapper), [this](const std::stop_token& stop) {
       mapping_.run(stop, [this] { mark_drained(keyframes_drained_); });
     });
-    threads_[2] = NamedThread(thread_options("tracker", pipeline.tracker),
+    if (detection_.is_enabled()) {
+      threads_[2] =
+          NamedThread(thread_options("detector", pipeline.detector), [this](const std::stop_token& stop) { detection_.run(stop); });
+    } else {
+      detection_.close_output();
+    }
+    threads_[3] = NamedThread(thread_options("tracker", pipeline.tracker),
                               [this](const std::stop_token& stop) { tracking_.run(stop, links_.frames); });
-    threads_[3] = NamedThread(thread_options("capture", pipeline.capture),
-                              [this](const std::stop_token& stop) { capture_.run(stop, links_.frames); });
+    threads_[4] = NamedThread(thread_options("capture", pipeline.capture),
+                              [this](const std::stop_token& stop) { capture_.run(stop, links_.frames, links_.newest_frame); });
   }
 
-  /// Capture, tracking and mapping in turn: the map that a frame is tracked against depends on the frames before it alone.
+  /// Capture, detection, tracking and mapping in turn: the map that a frame is tracked against depends on the frames before it
+  /// alone.
   void run_lockstep(const std::stop_token& stop) {
     bool more = capture_.begin();
     while (more && !stop.stop_requested()) {
       FrameRef frame;
       more = capture_.next(stop, frame);
       if (frame) {
+        if (detection_.is_enabled()) {
+          detection_.detect_unhurried(*frame, stop);
+        }
         tracking_.track(*frame, stop);
         while (mapping_.step()) {
         }
@@ -205,6 +226,7 @@ class Pipeline final : public App {
     mapping_.finish(stop, [this] {
       mark_drained(keyframes_drained_);
       tracking_.close_outputs();
+      detection_.close_output();
     });
   }
 
@@ -222,6 +244,7 @@ class Pipeline final : public App {
   TrackingStage tracking_;
   MapSaver saver_;
   MappingStage mapping_;
+  DetectionStage detection_;
   PublishStage publish_;
 
   std::atomic<bool> estimates_drained_{false};
@@ -229,7 +252,7 @@ class Pipeline final : public App {
   WakeEvent drained_event_;
 
   bool started_ = false;
-  std::array<NamedThread, 4> threads_;
+  std::array<NamedThread, 5> threads_;
 };
 
 Status check(const Config& config, const PipelineParts& parts) {
@@ -238,11 +261,12 @@ Status check(const Config& config, const PipelineParts& parts) {
     return make_error(ErrorCode::InvalidConfig,
                       "pipeline.frame_slots, frame_queue, keyframe_queue and publish_queue must each be at least 1");
   }
-  // One frame is being filled and one tracked while the queue is full.
-  if (pipeline.frame_slots < pipeline.frame_queue + 2) {
+  // One frame is being filled and one tracked while the queue is full; others wait for the detector.
+  const int needed = pipeline.frame_queue + 2 + (parts.detector ? NewestFrameLink::kFramesHeld : 0);
+  if (pipeline.frame_slots < needed) {
     return make_error(ErrorCode::InvalidConfig,
-                      fmt::format("pipeline.frame_slots is {}; with pipeline.frame_queue = {} at least {} are needed",
-                                  pipeline.frame_slots, pipeline.frame_queue, pipeline.frame_queue + 2));
+                      fmt::format("pipeline.frame_slots is {}; with pipeline.frame_queue = {}{} at least {} are needed",
+                                  pipeline.frame_slots, pipeline.frame_queue, parts.detector ? " and a detector" : "", needed));
   }
   const SourceInfo& info = parts.source->info();
   if (info.width < 1 || info.height < 1) {

@@ -6,6 +6,7 @@
 #include "core/clock.h"
 #include "core/result.h"
 #include "daemon/app.h"
+#include "daemon/detector_port.h"
 #include "daemon/message_transport.h"
 #include "daemon/slam_ports.h"
 #include "drivers/rgbd_source.h"
@@ -17,6 +18,7 @@ struct PipelineParts {
   std::unique_ptr<RgbdSource> source;
   std::unique_ptr<FrameTracker> tracker;
   std::unique_ptr<KeyframeMapper> mapper;
+  std::unique_ptr<FrameDetector> detector;      ///< null: nobody is looked for
   std::unique_ptr<MessageTransport> transport;  ///< null: nothing is published
 };
 

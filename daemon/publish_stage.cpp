@@ -12,15 +12,14 @@ constexpr TimeNs kLongestSleepNs = kNsPerSecond;
 
 }  // namespace
 
-PublishStage::PublishStage(EstimateLink& in, std::unique_ptr<Publisher> publisher,
-                           std::function<void(const PoseEstimate&)> on_estimate, const Clock& clock)
-    : in_(in), publisher_(std::move(publisher)), on_estimate_(std::move(on_estimate)), clock_(clock) {}
+PublishStage::PublishStage(Inputs in, std::unique_ptr<Publisher> publisher, Observers observers, const Clock& clock)
+    : in_(in), publisher_(std::move(publisher)), observers_(std::move(observers)), clock_(clock) {}
 
 void PublishStage::run(const std::stop_token& stop, const std::function<void()>& on_drained) {
   bool drained = false;
   while (!stop.stop_requested()) {
-    const std::uint32_t seen = in_.generation();
-    const bool was_closed = in_.is_closed();
+    const std::uint32_t seen = in_.estimates.generation();
+    const bool was_closed = in_.estimates.is_closed() && in_.detections.is_closed();
     const TimeNs due_ns = publisher_ ? publisher_->do_due_work() : clock_.now_ns() + kLongestSleepNs;
     if (step()) {
       continue;
@@ -32,7 +31,7 @@ void PublishStage::run(const std::stop_token& stop, const std::function<void()>&
       }
       on_drained();
     }
-    in_.wait_arrived(seen, std::clamp<TimeNs>(due_ns - clock_.now_ns(), 0, kLongestSleepNs));
+    in_.estimates.wait_arrived(seen, std::clamp<TimeNs>(due_ns - clock_.now_ns(), 0, kLongestSleepNs));
   }
   if (publisher_) {
     publisher_->publish_status();
@@ -40,18 +39,37 @@ void PublishStage::run(const std::stop_token& stop, const std::function<void()>&
 }
 
 bool PublishStage::step() {
-  const std::optional<PoseEstimate> estimate = in_.ring.pop();
+  return publish_estimate() || publish_detections();
+}
+
+bool PublishStage::publish_estimate() {
+  const std::optional<PoseEstimate> estimate = in_.estimates.ring.pop();
   if (!estimate) {
     return false;
   }
-  in_.notify_taken();
+  in_.estimates.notify_taken();
   const TimeNs publish_ns = clock_.now_ns();
   latency_.record(publish_ns - estimate->capture_ns);
   if (publisher_) {
     publisher_->publish(*estimate, publish_ns);
   }
-  if (on_estimate_) {
-    on_estimate_(*estimate);
+  if (observers_.on_estimate) {
+    observers_.on_estimate(*estimate);
+  }
+  return true;
+}
+
+bool PublishStage::publish_detections() {
+  const std::optional<Detections> detections = in_.detections.ring.pop();
+  if (!detections) {
+    return false;
+  }
+  in_.detections.notify_taken();
+  if (publisher_) {
+    publisher_->publish(*detections, clock_.now_ns());
+  }
+  if (observers_.on_detections) {
+    observers_.on_detections(*detections);
   }
   return true;
 }

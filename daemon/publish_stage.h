@@ -5,6 +5,7 @@
 #include <stop_token>
 
 #include "core/clock.h"
+#include "core/detections.h"
 #include "core/estimates.h"
 #include "core/metrics.h"
 #include "daemon/health.h"
@@ -17,22 +18,33 @@ namespace posed {
 /// which is why this has a thread to itself. Thread-bound to the publisher thread, but for `report`, which is thread-safe.
 class PublishStage {
  public:
-  /// `publisher` may be null (nothing is sent) and `on_estimate` empty. `in` and `clock` must outlive the stage.
-  PublishStage(EstimateLink& in, std::unique_ptr<Publisher> publisher, std::function<void(const PoseEstimate&)> on_estimate,
-               const Clock& clock);
+  struct Inputs {
+    EstimateLink& estimates;
+    DetectionsLink& detections;  ///< whoever fills it wakes `estimates`
+  };
+  /// Show what was published to whoever asked; each may be empty.
+  struct Observers {
+    std::function<void(const PoseEstimate&)> on_estimate;
+    std::function<void(const Detections&)> on_detections;
+  };
 
-  /// The thread's body. Calls `on_drained` once, when the estimates have ended and all are published; status goes on until `stop`.
+  /// `publisher` may be null: nothing is sent. The links and `clock` must outlive the stage.
+  PublishStage(Inputs in, std::unique_ptr<Publisher> publisher, Observers observers, const Clock& clock);
+
+  /// The thread's body. Calls `on_drained` once, when both inputs have ended and all is published; status goes on until `stop`.
   void run(const std::stop_token& stop, const std::function<void()>& on_drained);
 
   void report(HealthReport& health) const;
 
  private:
-  /// Publishes the oldest estimate that waits; false where there is none.
+  /// Publishes the oldest estimate, or else the oldest detections that wait; false where there is nothing.
   bool step();
+  bool publish_estimate();
+  bool publish_detections();
 
-  EstimateLink& in_;
+  Inputs in_;
   std::unique_ptr<Publisher> publisher_;
-  std::function<void(const PoseEstimate&)> on_estimate_;
+  Observers observers_;
   const Clock& clock_;
   LatencyHistogram latency_;
 };

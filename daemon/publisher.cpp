@@ -14,8 +14,8 @@ namespace posed {
 Publisher::Publisher(const PublisherConfig& config, const Se3& T_base_camera, std::unique_ptr<MessageTransport> transport,
                      const Clock& clock, std::function<HealthReport()> health, std::unique_ptr<MapRequests> requests)
     : config_(config),
-      channels_{config.channel_prefix + "POSE", config.channel_prefix + "STATUS", config.channel_prefix + "BOT_POSE",
-                config.channel_prefix + "MAP_REQUEST", config.channel_prefix + "MAP_REPLY"},
+      channels_{config.channel_prefix + "POSE",        config.channel_prefix + "STATUS",    config.channel_prefix + "BOT_POSE",
+                config.channel_prefix + "MAP_REQUEST", config.channel_prefix + "MAP_REPLY", config.channel_prefix + "DETECTIONS"},
       T_base_camera_(T_base_camera),
       transport_(std::move(transport)),
       clock_(clock),
@@ -36,6 +36,10 @@ void Publisher::publish(const PoseEstimate& estimate, TimeNs publish_ns) {
       send(channels_.bot_pose, *pose);
     }
   }
+}
+
+void Publisher::publish(const Detections& detections, TimeNs publish_ns) {
+  send(channels_.detections, to_detections_message(detections, publish_ns));
 }
 
 TimeNs Publisher::do_due_work() {

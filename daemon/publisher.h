@@ -9,6 +9,7 @@
 
 #include "config/config.h"
 #include "core/clock.h"
+#include "core/detections.h"
 #include "core/estimates.h"
 #include "core/metrics.h"
 #include "core/se3.h"
@@ -29,6 +30,9 @@ class Publisher {
 
   /// Sends the pose (and the bot_core pose where it is configured), stamped with `publish_ns`.
   void publish(const PoseEstimate& estimate, TimeNs publish_ns);
+
+  /// Sends the people seen in a frame, stamped with `publish_ns`.
+  void publish(const Detections& detections, TimeNs publish_ns);
 
   /// Does what is due by now: opens the transport, sends a status, takes requests and sends replies. Returns when it wants to be
   /// called next [ns, monotonic].
@@ -57,6 +61,7 @@ class Publisher {
     std::string bot_pose;
     std::string map_request;
     std::string map_reply;
+    std::string detections;
   } channels_;
   Se3 T_base_camera_;
   std::unique_ptr<MessageTransport> transport_;

@@ -6,8 +6,10 @@
 
 #include "core/bounded_ring.h"
 #include "core/clock.h"
+#include "core/detections.h"
 #include "core/estimates.h"
 #include "core/frame_pool.h"
+#include "core/latest_value.h"
 #include "core/overflow_ring.h"
 #include "core/wake_event.h"
 #include "slam/keyframe_record.h"
@@ -86,8 +88,53 @@ class StageLink {
   std::atomic<bool> closed_{false};
 };
 
+/// The joint between the capture thread and a stage that wants the newest frame alone. It holds up to three frames of the pool.
+class NewestFrameLink {
+ public:
+  static constexpr int kFramesHeld = 3;
+
+  /// Producer. Never waits.
+  void push(const FrameRef& frame) noexcept {
+    frames_.back() = frame;
+    frames_.publish();
+    arrived_.notify();
+  }
+
+  /// Producer: nothing follows.
+  void close() noexcept {
+    closed_.store(true, std::memory_order_release);
+    arrived_.notify();
+  }
+
+  /// Anyone: makes the consumer look at its stop token.
+  void wake() noexcept { arrived_.notify(); }
+
+  /// Consumer. Calls `look` with the newest frame whenever there is one that was not looked at, until a stop is requested or the
+  /// producer has closed the link and the last frame was looked at.
+  template <typename Look>
+  void consume(const std::stop_token& stop, Look&& look) {
+    while (!stop.stop_requested()) {
+      const std::uint32_t seen = arrived_.generation();
+      const bool was_closed = closed_.load(std::memory_order_acquire);
+      if (frames_.refresh()) {
+        look(*frames_.front());
+      } else if (was_closed) {
+        return;
+      } else {
+        arrived_.wait(seen, kNsPerSecond);
+      }
+    }
+  }
+
+ private:
+  LatestValue<FrameRef> frames_;
+  WakeEvent arrived_;
+  std::atomic<bool> closed_{false};
+};
+
 using FrameLink = StageLink<OverflowRing<FrameRef>>;
 using KeyframeLink = StageLink<BoundedRing<KeyframeRecord>>;
 using EstimateLink = StageLink<OverflowRing<PoseEstimate>>;
+using DetectionsLink = StageLink<OverflowRing<Detections>>;
 
 }  // namespace posed

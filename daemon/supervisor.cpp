@@ -193,6 +193,10 @@ std::string describe(const HealthReport& health, double rate_hz) {
       to_string(health.state), health.source_failed ? ", source failed" : "", rate_hz, health.frames_tracked, health.frames_lost,
       lost_before_tracker, health.poses_published, health.poses_dropped, health.publish_errors, health.track.p50_ms,
       health.track.p99_ms, health.latency.p50_ms, health.latency.p99_ms, health.map_keyframes, health.map_landmarks);
+  if (!health.detector_model.empty()) {
+    line += fmt::format("; people looked for in {} frames by {}, p50 {:.1f} ms p99 {:.1f} ms, {} given up", health.detected,
+                        health.detector_model, health.detect.p50_ms, health.detect.p99_ms, health.detections_abandoned);
+  }
   return line;
 }
 

@@ -83,10 +83,12 @@ TEST(LcmDelivery, TenThousandPosesAtOneKilohertzAllArriveInAnotherProcess) {
 
   const SystemClock& clock = SystemClock::instance();
   EstimateLink link(64);
-  PublishStage stage(link,
+  DetectionsLink detections(1);
+  detections.close();
+  PublishStage stage({link, detections},
                      std::make_unique<Publisher>(PublisherConfig{.url = url}, Se3(), std::make_unique<LcmTransport>(url), clock,
                                                  [] { return HealthReport{}; }),
-                     nullptr, clock);
+                     {}, clock);
   std::atomic<bool> drained{false};
   WakeEvent drained_event;
   ThreadOptions thread_options;

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <stop_token>
+
+#include "core/detections.h"
+#include "core/metrics.h"
+#include "core/rgbd_frame.h"
+#include "daemon/detector_port.h"
+#include "daemon/health.h"
+#include "daemon/stage_link.h"
+
+namespace posed {
+
+/// Looks for people in the newest frame, as often as the detector can: frames that come meanwhile are passed over, so that what it
+/// finds is never older than it must be. Thread-bound to the detector thread (in lockstep, the tracking thread), but for `report`,
+/// which is thread-safe.
+class DetectionStage {
+ public:
+  /// `detector` may be null: then nobody is looked for. Everything passed in must outlive the stage. `wake_publisher` is called
+  /// after something was put into `out`, or it was closed.
+  DetectionStage(FrameDetector* detector, NewestFrameLink& in, DetectionsLink& out, std::function<void()> wake_publisher);
+
+  bool is_enabled() const { return detector_ != nullptr; }
+
+  /// The thread's body in real time. Closes `out` when `in` has ended.
+  void run(const std::stop_token& stop);
+
+  /// In lockstep: every frame, as long as it takes; waits where the publisher is behind.
+  void detect_unhurried(const RgbdFrame& frame, const std::stop_token& stop);
+
+  /// Tells the publisher that nothing follows.
+  void close_output();
+
+  void report(HealthReport& health) const;
+
+ private:
+  void note(const Result<DetectionOutcome>& outcome);
+  void hand_on(const Detections& found);
+
+  FrameDetector* detector_;
+  NewestFrameLink& in_;
+  DetectionsLink& out_;
+  std::function<void()> wake_publisher_;
+  bool complained_ = false;  // of the engine
+
+  Counter detected_;
+  Counter abandoned_;
+  Counter errors_;
+  Counter dropped_;
+  std::atomic<std::size_t> model_{0};
+  LatencyHistogram detect_time_;
+  LatencyHistogram overrun_;
+};
+
+}  // namespace posed
