@@ -8,8 +8,7 @@ function(posed_detect_kernels table)
   target_compile_options(posed_detect_${table} PRIVATE -O3 -fno-trapping-math ${ARGN})
 endfunction()
 
-# gcc remarks that a vector would be passed otherwise with other flags; the functions that pass vectors are inlined.
-posed_detect_kernels(kTensorKernelsBaseline $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
+posed_detect_kernels(kTensorKernelsBaseline)
 set(POSED_DETECT_KERNEL_OBJECTS $<TARGET_OBJECTS:posed_detect_kTensorKernelsBaseline>)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
   posed_detect_kernels(kTensorKernelsAvx2 -mavx2)

@@ -202,7 +202,7 @@ void OnnxGraphBuilder::add_node(const onnx::NodeProto& proto) {
     }
     constants_[proto.output(0)] = read_constant(value->t());
   } else if (type == "Identity") {
-    tensors_[proto.output(0)] = tensor_of(proto, 0);
+    identity(proto);
   } else if (type == "Conv") {
     convolution(proto);
   } else if (type == "BatchNormalization") {
@@ -234,6 +234,16 @@ void OnnxGraphBuilder::add_node(const onnx::NodeProto& proto) {
     slice(proto);
   } else {
     refuse(proto, "this operator is not supported; the OpenCV engine may run this file");
+  }
+}
+
+/// Of a tensor, or of weights: exporters write equal constants once.
+void OnnxGraphBuilder::identity(const onnx::NodeProto& proto) {
+  const auto constant = proto.input_size() > 0 ? constants_.find(proto.input(0)) : constants_.end();
+  if (constant != constants_.end()) {
+    constants_[proto.output(0)] = OnnxConstant(constant->second);
+  } else {
+    tensors_[proto.output(0)] = tensor_of(proto, 0);
   }
 }
 

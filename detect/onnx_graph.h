@@ -55,6 +55,7 @@ class OnnxGraphBuilder {
 
   void add_node(const onnx::NodeProto& proto);
   int append(const onnx::NodeProto& proto, Operation operation, std::vector<int> inputs);
+  void identity(const onnx::NodeProto& proto);
   void convolution(const onnx::NodeProto& proto);
   void batch_normalization(const onnx::NodeProto& proto);
   void max_pool(const onnx::NodeProto& proto);

@@ -19,7 +19,7 @@ namespace posed {
 namespace {
 
 constexpr std::int64_t kOldestOperators = 11;
-constexpr std::int64_t kNewestOperators = 13;
+constexpr std::int64_t kNewestOperators = 17;
 
 [[noreturn]] void refuse(std::string what, ErrorCode code = ErrorCode::BadData) {
   throw OnnxRefusal{code, std::move(what)};

@@ -10,7 +10,7 @@
 
 namespace posed {
 
-/// Reads an ONNX file of operator set 11 to 13 with one image of a fixed size as input and the operations of `Operation`. The
+/// Reads an ONNX file of operator set 11 to 17 with one image of a fixed size as input and the operations of `Operation`. The
 /// metadata are in the model's properties, as JSON: "posed.name" a string, "posed.classes" a list of strings, "posed.strides" a
 /// list of numbers and "posed.anchors" a list of lists of [width, height] for each output, "posed.input" [channels, height, width];
 /// all may be absent. Reentrant. Errors: NotFound; Io; BadData, with file, node and operator: no ONNX, truncated, not sound;

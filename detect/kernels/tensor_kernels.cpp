@@ -5,7 +5,11 @@
 namespace posed {
 namespace {
 
-constexpr std::size_t kLanes = 8;
+#ifdef __AVX__
+constexpr std::size_t kLanes = 8;  // 16 would leave most of a vector unused: the smaller networks have 8 to 32 channels
+#else
+constexpr std::size_t kLanes = 4;
+#endif
 using Floats = float __attribute__((vector_size(kLanes * sizeof(float))));
 
 inline Floats load(const float* from) {
@@ -16,6 +20,22 @@ inline Floats load(const float* from) {
 
 inline void store(const Floats& values, float* to) {
   __builtin_memcpy(to, &values, sizeof values);
+}
+
+using Quad = float __attribute__((vector_size(4 * sizeof(float))));
+constexpr std::size_t kQuads = kLanes / 4;
+
+/// The vector's parts of four, added up; and the larger of each.
+inline Quad folded_sum(const Floats& values) {
+  Quad quads[kQuads];
+  __builtin_memcpy(quads, &values, sizeof values);
+  return kQuads == 1 ? quads[0] : quads[0] + quads[kQuads - 1];
+}
+
+inline Quad folded_maximum(const Floats& values) {
+  Quad quads[kQuads];
+  __builtin_memcpy(quads, &values, sizeof values);
+  return quads[0] > quads[kQuads - 1] ? quads[0] : quads[kQuads - 1];
 }
 
 inline float larger(float a, float b) {
@@ -240,8 +260,8 @@ void gate_channels(const float* __restrict in, const float* __restrict gates, st
         best = values > best ? values : best;
       }
       // Pairwise, so that no addition waits for all before it.
-      const float s[4] = {sums[0] + sums[4], sums[1] + sums[5], sums[2] + sums[6], sums[3] + sums[7]};
-      const float m[4] = {larger(best[0], best[4]), larger(best[1], best[5]), larger(best[2], best[6]), larger(best[3], best[7])};
+      const Quad s = folded_sum(sums);
+      const Quad m = folded_maximum(best);
       sum = (s[0] + s[2]) + (s[1] + s[3]);
       maximum = larger(larger(m[0], m[2]), larger(m[1], m[3]));
     }

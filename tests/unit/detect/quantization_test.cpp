@@ -31,7 +31,7 @@ TEST(QuantizationPlan, CopiesShareOneQuantization) {
   Network network = Network::create("f", {2, 4, 4}, nodes, {4, 6}, {}).value();
   ASSERT_TRUE(network.set_ranges({{0, 1}, {-1, 2}, {-4, 1}, {-1, 2}, {0, 8}, {-4, 2}, {0, 3}}));
   const std::vector<Quantization> plan = plan_quantization(network);
-  for (const std::size_t tensor : {1, 2, 3, 5}) {
+  for (const std::size_t tensor : {1U, 2U, 3U, 5U}) {
     EXPECT_FLOAT_EQ(plan[tensor].scale, 6.0F / 255) << tensor;
     EXPECT_EQ(plan[tensor].zero_point, 170) << tensor;
   }

@@ -50,13 +50,13 @@ Trajectory curve(int poses, double scale) {
 TEST(Posectl, HelpNamesSubcommandsAndExitCodes) {
   const Outcome outcome = posectl({"--help"});
   EXPECT_EQ(outcome.exit_code, kExitOk);
-  for (const char* text : {"replay", "eval", "watch", "synth", "check-config", "version", "Exit codes", "78"}) {
+  for (const char* text : {"replay", "eval", "watch", "synth", "model", "check-config", "version", "Exit codes", "78"}) {
     EXPECT_THAT(outcome.out, HasSubstr(text));
   }
 }
 
 TEST(Posectl, EverySubcommandHasHelp) {
-  for (const char* command : {"replay", "eval", "watch", "synth", "check-config", "version"}) {
+  for (const char* command : {"replay", "eval", "watch", "synth", "model", "check-config", "version"}) {
     EXPECT_EQ(posectl({command, "--help"}).exit_code, kExitOk) << command;
   }
 }

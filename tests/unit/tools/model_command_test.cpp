@@ -1,0 +1,133 @@
+#include <cstdint>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drivers/image_writer.h"
+#include "tests/support/temporary_folder.h"
+#include "tools/posectl/exit_code.h"
+#include "tools/posectl/model_bench.h"
+#include "tools/posectl/model_images.h"
+#include "tools/posectl/posectl.h"
+
+namespace posed {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kSmallOnnx = POSED_SOURCE_DIR "/tests/unit/detect/data/small.onnx";
+
+struct Outcome {
+  int exit_code = 0;
+  std::string out;
+  std::string err;
+};
+
+Outcome model(std::vector<std::string> arguments) {
+  std::ostringstream out;
+  std::ostringstream err;
+  arguments.insert(arguments.begin(), "model");
+  const int exit_code = run_posectl(std::move(arguments), {out, err, false, false});
+  return {exit_code, out.str(), err.str()};
+}
+
+/// A photograph of nothing: a gradient.
+std::string write_image(const TemporaryFolder& folder) {
+  constexpr int kWidth = 120;
+  constexpr int kHeight = 90;
+  std::vector<std::uint8_t> bgr(3 * kWidth * kHeight);
+  for (std::size_t i = 0; i < bgr.size(); ++i) {
+    bgr[i] = static_cast<std::uint8_t>(i * 7 / 3);
+  }
+  const std::string path = folder / "image.png";
+  const Status written = write_png_bgr8(path, {bgr.data(), kWidth, kHeight, 3 * kWidth, 3});
+  EXPECT_TRUE(written) << written.error().message;
+  return path;
+}
+
+TEST(ModelCommand, InfoTellsWhatAFileHolds) {
+  const Outcome outcome = model({"info", kSmallOnnx});
+  EXPECT_EQ(outcome.exit_code, kExitOk) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("small test network"), HasSubstr("input: 3x64x96"), HasSubstr("classes: person"),
+                                 HasSubstr("output 1: 18x8x12, stride 8, anchors 20x44 34x60 60x62"),
+                                 HasSubstr("50 when simplified"), HasSubstr("calibrated for 8 bits: no")));
+}
+
+TEST(ModelCommand, ConvertsAndCalibrates) {
+  const TemporaryFolder folder;
+  const std::string to = folder / "small.posednet";
+  const Outcome outcome = model({"convert", kSmallOnnx, to, "--weights", "int8", "--calibrate", write_image(folder)});
+  EXPECT_EQ(outcome.exit_code, kExitOk) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("calibrated for 8 bits"));
+  EXPECT_THAT(outcome.err, HasSubstr("calibrate"));
+  const Outcome info = model({"info", to});
+  EXPECT_THAT(info.out, AllOf(HasSubstr("small test network"), HasSubstr("calibrated for 8 bits: yes")));
+  // Its own file converts again, as it is.
+  EXPECT_EQ(model({"convert", to, folder / "again.posednet"}).exit_code, kExitOk);
+}
+
+TEST(ModelCommand, NamesWhatItCannotRead) {
+  const TemporaryFolder folder;
+  const Outcome missing = model({"info", folder / "missing.onnx"});
+  EXPECT_EQ(missing.exit_code, kExitNoInput);
+  EXPECT_THAT(missing.err, HasSubstr("missing.onnx"));
+  EXPECT_EQ(model({"info", folder.write("foreign.onnx", "nothing")}).exit_code, kExitBadData);
+  EXPECT_EQ(model({"convert", kSmallOnnx, folder / "no/such/folder.posednet"}).exit_code, kExitIo);
+  const Outcome image = model({"convert", kSmallOnnx, folder / "n", "--calibrate", folder.write("image.png", "no image").string()});
+  EXPECT_EQ(image.exit_code, kExitBadData);
+  EXPECT_THAT(image.err, HasSubstr("image.png"));
+  EXPECT_EQ(model({}).exit_code, kExitUsage);
+  EXPECT_EQ(model({"convert", kSmallOnnx, folder / "n", "--weights", "int4"}).exit_code, kExitUsage);
+}
+
+TEST(ModelCommand, BenchTimesEveryEngine) {
+  const TemporaryFolder folder;
+  const std::string own = folder / "small.posednet";
+  ASSERT_EQ(model({"convert", kSmallOnnx, own, "--calibrate", write_image(folder), "--quiet"}).exit_code, kExitOk);
+  const Outcome outcome = model({"bench", own, kSmallOnnx, "--against-opencv", "--runs", "3", "--steps"});
+  EXPECT_EQ(outcome.exit_code, kExitOk) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("small.posednet, posed f32"), HasSubstr("small.posednet, posed int8"),
+                                 HasSubstr("small.onnx, posed f32"), HasSubstr("small.onnx, OpenCV DNN"), HasSubstr("SpaceToDepth"),
+                                 Not(HasSubstr("small.onnx, posed int8"))));
+}
+
+TEST(ModelCommand, BenchOfEightBitsNeedsCalibration) {
+  const Outcome outcome = model({"bench", kSmallOnnx, "--precision", "int8", "--runs", "1"});
+  EXPECT_EQ(outcome.exit_code, kExitUnavailable);
+  EXPECT_THAT(outcome.err, HasSubstr("--calibrate"));
+}
+
+TEST(ModelBench, QuantilesAreDurationsThatOccurred) {
+  EXPECT_EQ(quantile_ns({5, 1, 3, 2, 4}, 0.5), 3);
+  EXPECT_EQ(quantile_ns({5, 1, 3, 2, 4}, 0), 1);
+  EXPECT_EQ(quantile_ns({5, 1, 3, 2, 4}, 0.99), 5);
+  EXPECT_EQ(quantile_ns({7}, 0.5), 7);
+}
+
+TEST(Letterbox, KeepsTheAspectAndSwapsToRgb) {
+  // Four by two, blue on the left and red on the right, into a square: two rows of border above and below.
+  std::vector<std::uint8_t> bgr(4 * 2 * 3);
+  for (std::size_t pixel = 0; pixel < 8; ++pixel) {
+    bgr[3 * pixel + (pixel % 4 < 2 ? 0 : 2)] = 255;
+  }
+  const TensorShape input{3, 8, 8};
+  std::vector<float> planes(input.size(), -1.0F);
+  letterbox({bgr.data(), 4, 2, 12, 3}, input, planes);
+  const auto at = [&](std::size_t channel, std::size_t y, std::size_t x) { return planes[(channel * 8 + y) * 8 + x]; };
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    EXPECT_FLOAT_EQ(at(channel, 1, 4), 114.0F / 255);
+    EXPECT_FLOAT_EQ(at(channel, 6, 4), 114.0F / 255);
+    EXPECT_EQ(at(channel, 3, 0), channel == 2 ? 1 : 0);
+    EXPECT_EQ(at(channel, 4, 7), channel == 0 ? 1 : 0);
+  }
+  // Half of the way from blue to red lies between columns 3 and 4.
+  EXPECT_FLOAT_EQ(at(0, 3, 3) + at(0, 3, 4), 1);
+}
+
+}  // namespace
+}  // namespace posed
