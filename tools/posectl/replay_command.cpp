@@ -38,13 +38,16 @@ struct ReplayOptions {
   std::filesystem::path online_trajectory;
   std::filesystem::path stats;
   std::filesystem::path groundtruth;
+  std::filesystem::path detections;
   std::filesystem::path map_in;
   std::filesystem::path map_out;
   bool localization_only = false;
   bool publish = false;
   bool quiet = false;
 
-  std::vector<std::filesystem::path> outputs() const { return {trajectory, online_trajectory, stats, groundtruth, map_out}; }
+  std::vector<std::filesystem::path> outputs() const {
+    return {trajectory, online_trajectory, stats, groundtruth, detections, map_out};
+  }
 };
 
 /// What the source complained of: the first few messages, and the last one, which tells why it failed. Thread-safe.
@@ -145,6 +148,15 @@ Status write_outputs(const ReplayOptions& options, const ReplayStats& stats, con
       .and_then([&] { return write(options.stats, to_json(stats)); });
 }
 
+/// One line a person: stamp of the frame [s], confidence, box [pixels].
+void append_detections(const Detections& detections, std::string& text) {
+  for (const Detection& d : detections.found()) {
+    text +=
+        fmt::format("{}.{:06d} {:.6f} {:.2f} {:.2f} {:.2f} {:.2f}\n", detections.stamp_utc_ns / kNsPerSecond,
+                    detections.stamp_utc_ns % kNsPerSecond / kNsPerUs, d.score, d.box.x_min, d.box.y_min, d.box.x_max, d.box.y_max);
+  }
+}
+
 /// What can be known to be wrong before anything runs.
 Status check_before_run(const ReplayOptions& options, const Config& config) {
   if (!options.groundtruth.empty() && config.source.kind != SourceKind::Synthetic) {
@@ -174,15 +186,18 @@ int run_replay(const ReplayOptions& options, const Console& console) {
     return report_error(console.err, config.error());
   }
   config->map.mode = options.localization_only ? MapMode::Localization : MapMode::Mapping;
+  config->detector.enabled = config->detector.enabled && (options.publish || !options.detections.empty());
   if (const Status status = check_before_run(options, *config); !status) {
     return report_error(console.err, status.error());
   }
   SourceErrors source_errors;
+  std::string detections;
   std::optional<EstimateRecorder> recorder;
   AppOptions app_options;
   app_options.publish = options.publish;
   app_options.map_files = MapFiles{options.map_in.string(), false, options.map_out.string()};  // never the robot's own
   app_options.on_estimate = [&recorder](const PoseEstimate& estimate) { recorder->record(estimate); };
+  app_options.on_detections = [&detections](const Detections& found) { append_detections(found, detections); };
   app_options.on_source_error = [&source_errors](const Error& error) { source_errors.add(error); };
   const Result<std::unique_ptr<App>> app = App::create(*config, app_options, SystemClock::instance());
   if (!app) {
@@ -195,9 +210,10 @@ int run_replay(const ReplayOptions& options, const Console& console) {
     return report_error(console.err, stats.error());
   }
   source_errors.print(console.err);
-  const Status written = write_outputs(options, *stats, *recorder, **app, console.err).and_then([&] {
-    return options.groundtruth.empty() ? Status{} : write_truth(options.groundtruth, *config, *recorder);
-  });
+  const Status written =
+      write_outputs(options, *stats, *recorder, **app, console.err)
+          .and_then([&] { return options.groundtruth.empty() ? Status{} : write_truth(options.groundtruth, *config, *recorder); })
+          .and_then([&] { return options.detections.empty() ? Status{} : write_whole_file(options.detections, detections); });
   if (!written) {
     return report_error(console.err, written.error());
   }
@@ -249,6 +265,8 @@ void add_replay_command(CLI::App& parent, const Console& console, int& exit_code
   command->add_option("--stats", options->stats, "Write counters and latencies (JSON)");
   command->add_option("--groundtruth", options->groundtruth,
                       "Synthetic: write the true pose of every processed frame (TUM format)");
+  command->add_option("--detections", options->detections,
+                      "Look for people, and write lines `stamp score x_min y_min x_max y_max` [s, pixels]");
   CLI::Option* map_in = command->add_option("--map-in", options->map_in, "Begin with this saved map");
   CLI::Option* map_out = command->add_option("--map-out", options->map_out, "Save the map at the end");
   command->add_flag("--localization-only", options->localization_only, "Use the map of --map-in without changing it")

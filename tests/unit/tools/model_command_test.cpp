@@ -10,7 +10,6 @@
 #include "tests/support/temporary_folder.h"
 #include "tools/posectl/exit_code.h"
 #include "tools/posectl/model_bench.h"
-#include "tools/posectl/model_images.h"
 #include "tools/posectl/posectl.h"
 
 namespace posed {
@@ -107,26 +106,6 @@ TEST(ModelBench, QuantilesAreDurationsThatOccurred) {
   EXPECT_EQ(quantile_ns({5, 1, 3, 2, 4}, 0), 1);
   EXPECT_EQ(quantile_ns({5, 1, 3, 2, 4}, 0.99), 5);
   EXPECT_EQ(quantile_ns({7}, 0.5), 7);
-}
-
-TEST(Letterbox, KeepsTheAspectAndSwapsToRgb) {
-  // Four by two, blue on the left and red on the right, into a square: two rows of border above and below.
-  std::vector<std::uint8_t> bgr(4 * 2 * 3);
-  for (std::size_t pixel = 0; pixel < 8; ++pixel) {
-    bgr[3 * pixel + (pixel % 4 < 2 ? 0 : 2)] = 255;
-  }
-  const TensorShape input{3, 8, 8};
-  std::vector<float> planes(input.size(), -1.0F);
-  letterbox({bgr.data(), 4, 2, 12, 3}, input, planes);
-  const auto at = [&](std::size_t channel, std::size_t y, std::size_t x) { return planes[(channel * 8 + y) * 8 + x]; };
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    EXPECT_FLOAT_EQ(at(channel, 1, 4), 114.0F / 255);
-    EXPECT_FLOAT_EQ(at(channel, 6, 4), 114.0F / 255);
-    EXPECT_EQ(at(channel, 3, 0), channel == 2 ? 1 : 0);
-    EXPECT_EQ(at(channel, 4, 7), channel == 0 ? 1 : 0);
-  }
-  // Half of the way from blue to red lies between columns 3 and 4.
-  EXPECT_FLOAT_EQ(at(0, 3, 3) + at(0, 3, 4), 1);
 }
 
 }  // namespace
