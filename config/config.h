@@ -70,6 +70,7 @@ struct MapperConfig {
   int bundle_iterations = 5;     ///< a round, of two
   double bundle_budget_s = 0.2;  ///< after which a local bundle adjustment is given up (not in lockstep)
   bool loop_closing = true;      ///< look for places seen before
+  double drift_factor = 3.0;     ///< of a keyframe's own covariance in the drift that later poses inherit; slam/drift_model.h
   double loop_max_drift = 0.05;  ///< of the path in the map: a closure that asks for a larger correction is refused
 };
 

@@ -182,6 +182,10 @@ void add_mapper(SchemaBuilder& schema, MapperConfig& c) {
       .key("bundle_budget_s", real(c.bundle_budget_s, 0.001, 10.0), "s",
            "A local bundle adjustment is given up after this time, or when a keyframe waits. It keeps what it has reached. Without "
            "effect in lockstep.")
+      .key("drift_factor", real(c.drift_factor, 0.1, 100.0), "",
+           "For the covariance of poses: how many times the covariance of its own measurement a keyframe adds to the drift that "
+           "poses "
+           "after it inherit. Above 1, because neighbouring frames share errors.")
       .key("loop_closing", BoolField{&c.loop_closing}, "", "Look for places that were seen before, and correct the map by them.")
       .key("loop_max_drift", real(c.loop_max_drift, 0.001, 1.0), "",
            "Largest drift to be believed, as a share of the shortest path in the map between the two views: a closure that asks "

@@ -47,6 +47,7 @@ struct Links {
     keyframes.ring.prepare([&](KeyframeRecord& record) { record.reserve(feature_capacity(config.tracker.features)); });
     snapshots.prepare([&](MapSnapshot& snapshot) {
       snapshot.landmarks.reserve(size_of(config.mapper.local_landmarks));
+      snapshot.anchors.reserve(size_of(config.mapper.max_keyframes));
       snapshot.keyframes.reserve(size_of(config.mapper.recovery_keyframes));
     });
   }

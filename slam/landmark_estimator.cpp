@@ -127,7 +127,8 @@ SnapshotLandmark to_snapshot(LandmarkId id, const Landmark& landmark) {
           landmark.mean_view_map.cast<float>(),
           landmark.max_distance_m,
           landmark.min_distance_m,
-          landmark.descriptor};
+          landmark.descriptor,
+          0};
 }
 
 }  // namespace posed

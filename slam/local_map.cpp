@@ -1,7 +1,9 @@
 #include "slam/local_map.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
+#include <unordered_map>
 #include <unordered_set>
 
 #include "slam/landmark_estimator.h"
@@ -60,8 +62,18 @@ LocalMap select_local_map(const Map& map, KeyframeId centre, std::size_t max_key
 
 void write_local_map(const Map& map, const LocalMap& local, std::size_t max_keyframes, MapSnapshot& snapshot) {
   snapshot.landmarks.clear();
+  snapshot.anchors.clear();
+  std::unordered_map<KeyframeId, std::uint32_t> anchors;  // their indices
   for (const LandmarkId id : local.landmarks) {
-    snapshot.landmarks.push_back(to_snapshot(id, *map.find_landmark(id)));
+    const Landmark& landmark = *map.find_landmark(id);
+    const KeyframeId oldest = landmark.oldest_observer();
+    const auto [anchor, is_new] = anchors.try_emplace(oldest, static_cast<std::uint32_t>(snapshot.anchors.size()));
+    if (is_new) {
+      const Keyframe& keyframe = *map.find_keyframe(oldest);
+      snapshot.anchors.push_back({keyframe.T_map_camera, keyframe.covariance});
+    }
+    snapshot.landmarks.push_back(to_snapshot(id, landmark));
+    snapshot.landmarks.back().anchor = anchor->second;
   }
   snapshot.keyframes.resize(std::min(local.keyframes.size(), max_keyframes));
   for (std::size_t i = 0; i < snapshot.keyframes.size(); ++i) {

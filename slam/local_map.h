@@ -18,7 +18,8 @@ struct LocalMap {
 /// out first. Reentrant.
 LocalMap select_local_map(const Map& map, KeyframeId centre, std::size_t max_keyframes, std::size_t max_landmarks);
 
-/// Overwrites landmarks and keyframes (at most `max_keyframes`) of the snapshot; its vectors keep their capacity. Reentrant.
+/// Overwrites landmarks, their anchors and keyframes (at most `max_keyframes`) of the snapshot; its vectors keep their capacity.
+/// Reentrant.
 void write_local_map(const Map& map, const LocalMap& local, std::size_t max_keyframes, MapSnapshot& snapshot);
 
 }  // namespace posed

@@ -19,6 +19,13 @@ struct SnapshotLandmark {
   float max_distance_m = 0;  ///< from here the pyramid's first level (0) shows it at the scale it was described at
   float min_distance_m = 0;  ///< from here the last level does
   Descriptor descriptor{};
+  std::uint32_t anchor = 0;  ///< index into MapSnapshot::anchors
+};
+
+/// The first keyframe that saw a landmark, whose error the landmark has.
+struct SnapshotAnchor {
+  Se3 T_map_camera;
+  Matrix6d covariance = Matrix6d::Zero();  ///< against the map's origin, as in PoseEstimate
 };
 
 /// A recent keyframe, to recover from loss by matching against it.
@@ -46,12 +53,9 @@ struct MapSnapshot {
   /// next pose, stays continuous when the map is corrected.
   Se3 T_map_odom;
   KeyframeId newest_keyframe = kNoKeyframe;  ///< the last one the mapper has taken in
-  /// The keyframe whose error bounds that of the landmarks here best, and its covariance against the map's origin, as in
-  /// PoseEstimate: the drift that a pose tracked against this snapshot inherits.
-  Se3 T_map_anchor;
-  Matrix6d anchor_covariance = Matrix6d::Zero();
   RelocalizationAnswer relocalization;
   std::vector<SnapshotLandmark> landmarks;  ///< by ascending id
+  std::vector<SnapshotAnchor> anchors;      ///< of those landmarks
   std::vector<SnapshotKeyframe> keyframes;  ///< the one this is the surroundings of, then those nearest to it
 };
 

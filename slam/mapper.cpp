@@ -25,7 +25,6 @@ namespace {
 
 constexpr std::size_t kYoungMapKeyframes = 5;  // a map that is left with fewer is not worth keeping
 constexpr std::size_t kKeptNewest = 3;         // keyframes not judged redundant yet
-constexpr double kAnchorShare = 0.2;           // of its landmarks that a keyframe must share with the one whose drift it inherits
 constexpr int kFullIterations = 10;            // a round
 
 /// Interrupts when asked to, or after `budget_s`; never where nobody asks (lockstep).
@@ -55,7 +54,7 @@ struct Mapper::Impl {
   void insert_keyframe(const KeyframeRecord& record);
   void visit(const KeyframeRecord& record);
   void answer(const KeyframeRecord& record);
-  void renew_anchor(const Matrix6d& given_map);
+  Matrix6d inherited_covariance(const KeyframeRecord& record) const;
 
   bool improve(const Interrupt& interrupt);
   void adjust_locally(const Interrupt& interrupt);
@@ -86,7 +85,6 @@ struct Mapper::Impl {
   KeyframeId newest = kNoKeyframe;       // last one taken in
   KeyframeId newest_seen = kNoKeyframe;  // last one handed over, visits of a map that stays as it is included
   KeyframeId centre = kNoKeyframe;       // of the local map
-  KeyframeId anchor = kNoKeyframe;
   Se3 T_map_odom;
   RelocalizationAnswer relocalization;
   MapperCounters counters;
@@ -145,7 +143,7 @@ void Mapper::Impl::insert_keyframe(const KeyframeRecord& record) {
                T_map_odom * record.T_map_odom.inverse() * record.T_map_camera);
   newest = record.id;
   centre = record.id;
-  renew_anchor(record.covariance);
+  map.find_keyframe(newest)->covariance = inherited_covariance(record);
   places.add(record.id, record.features.descriptors);
   keep_budget();
   pending.extend = true;
@@ -153,29 +151,22 @@ void Mapper::Impl::insert_keyframe(const KeyframeRecord& record) {
   pending.close_loop = config.loop_closing;
 }
 
-/// A keyframe inherits the drift of the keyframe that leaves it least uncertain, of those that share enough of its landmarks.
-void Mapper::Impl::renew_anchor(const Matrix6d& given_map) {
-  Keyframe& keyframe = *map.find_keyframe(newest);
-  const auto seen =
-      std::count_if(keyframe.landmarks.begin(), keyframe.landmarks.end(), [](LandmarkId id) { return id != kNoLandmark; });
-  int most_shared = 0;
-  for (const auto& [id, shared] : keyframe.covisible) {
-    most_shared = std::max(most_shared, shared);
-  }
-  const double enough = std::min(kAnchorShare * static_cast<double>(seen), static_cast<double>(most_shared));
-  anchor = newest;
-  keyframe.covariance = given_map + start_covariance();
-  double least = std::numeric_limits<double>::infinity();
-  for (const auto& [id, shared] : keyframe.covisible) {
-    const Keyframe& other = *map.find_keyframe(id);
-    const Matrix6d covariance =
-        drifted_covariance(given_map, other.T_map_camera.inverse() * keyframe.T_map_camera, other.covariance);
-    if (shared >= enough && covariance.trace() < least) {
-      least = covariance.trace();
-      keyframe.covariance = covariance;
-      anchor = id;
+/// Of the newest keyframe, by the landmarks that were there before it.
+Matrix6d Mapper::Impl::inherited_covariance(const KeyframeRecord& record) const {
+  const Keyframe& keyframe = *map.find_keyframe(newest);
+  std::map<KeyframeId, int> anchors;  // landmarks seen of each
+  for (const LandmarkId id : keyframe.landmarks) {
+    if (id != kNoLandmark) {
+      ++anchors[map.find_landmark(id)->oldest_observer()];
     }
   }
+  anchors.erase(newest);
+  InheritedDrift inherited;
+  for (const auto& [id, landmarks] : anchors) {
+    const Keyframe& anchor = *map.find_keyframe(id);
+    inherited.add(landmarks, anchor.T_map_camera.inverse() * keyframe.T_map_camera, anchor.covariance);
+  }
+  return inherited.covariance(config.drift_factor * record.covariance);
 }
 
 /// The map stays as it is; only what is shown of it follows the camera.
@@ -192,7 +183,6 @@ void Mapper::Impl::visit(const KeyframeRecord& record) {
       std::max_element(seen_by.begin(), seen_by.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   if (best != seen_by.end()) {
     centre = best->first;
-    anchor = centre;
   }
   dropped.remember_fixed(record.id, record.T_map_camera);
 }
@@ -208,7 +198,6 @@ void Mapper::Impl::answer(const KeyframeRecord& record) {
   relocalization.found = true;
   relocalization.T_map_camera = found->T_map_camera;
   centre = found->keyframe;
-  anchor = centre;
   newest = centre;  // keyframes that follow belong to its map
 }
 
@@ -293,7 +282,6 @@ void Mapper::Impl::drop(KeyframeId id) {
   dropped.remember(map, id, heir);
   places.remove(id);
   map.remove_keyframe(id);
-  anchor = anchor == id ? heir : anchor;
   centre = centre == id ? heir : centre;
 }
 
@@ -307,13 +295,11 @@ void Mapper::Impl::write_snapshot(MapSnapshot& snapshot) const {
   if (middle == nullptr) {
     snapshot.map_id = 0;
     snapshot.landmarks.clear();
+    snapshot.anchors.clear();
     snapshot.keyframes.clear();
     return;
   }
   snapshot.map_id = middle->map_id;
-  const Keyframe& drifted = *map.find_keyframe(anchor);
-  snapshot.T_map_anchor = drifted.T_map_camera;
-  snapshot.anchor_covariance = drifted.covariance;
   const LocalMap surroundings = select_local_map(map, centre, static_cast<std::size_t>(config.local_keyframes),
                                                  static_cast<std::size_t>(config.local_landmarks));
   write_local_map(map, surroundings, static_cast<std::size_t>(config.recovery_keyframes), snapshot);
@@ -343,7 +329,6 @@ Status Mapper::Impl::load(const std::string& path) {
     newest = keyframe.map_id == loaded->header.active_map || newest == kNoKeyframe ? id : newest;
   }
   centre = newest;
-  anchor = newest;
   ++version;
   return {};
 }

@@ -51,7 +51,7 @@ struct Tracker::Impl {
   void fill_keyframe(KeyframeRecord& record, const MapSnapshot& map);
   bool may_ask(const MapSnapshot& map) const;
   void fill_features(KeyframeRecord& record) const;
-  Matrix6d covariance_with_drift(const MapSnapshot& map) const;
+  Matrix6d covariance_with_drift(const MapSnapshot& map);
   void remember(const MapSnapshot& map);
   void refer_to_keyframe(const MapSnapshot& map, PoseEstimate& estimate) const;
 
@@ -75,6 +75,7 @@ struct Tracker::Impl {
   // From frame to frame.
   TrackingState state = TrackingState::Initializing;
   std::vector<LandmarkId> last_landmarks;  // inliers of the last frame, ascending
+  std::vector<std::uint32_t> anchors;      // of this frame's inliers, ascending; here to keep its memory
   KeyframeId last_keyframe = kNoKeyframe;
   int frames_since_keyframe = 0;
   int reference_inliers = 0;  // best seen since the mapper took the last keyframe in
@@ -101,6 +102,7 @@ Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, Ma
       T_map_start(T_map_camera_start),
       frame(camera, feature_capacity(tracker.features)) {
   last_landmarks.reserve(feature_capacity(config.features));
+  anchors.reserve(feature_capacity(config.features));
 }
 
 /// A map that was there before the first frame, loaded from a file, is searched before a new one is begun.
@@ -245,13 +247,27 @@ bool Tracker::Impl::may_ask(const MapSnapshot& map) const {
   return has_map && map.version > 0 && state != TrackingState::Initializing && !waiting && can_initialize();
 }
 
-/// The solver's covariance takes the landmarks as exact; their own error is that of the keyframe they hang on.
-Matrix6d Tracker::Impl::covariance_with_drift(const MapSnapshot& map) const {
+/// The solver's covariance takes the landmarks as exact; their own error is that of the keyframes they hang on.
+Matrix6d Tracker::Impl::covariance_with_drift(const MapSnapshot& map) {
   if (starts_map) {
     return start_covariance();
   }
+  anchors.clear();
+  for (const std::int32_t landmark : localizer.landmark_of()) {
+    if (landmark != kUnmatched) {
+      anchors.push_back(map.landmarks[static_cast<std::size_t>(landmark)].anchor);
+    }
+  }
+  std::sort(anchors.begin(), anchors.end());
   const PoseSolution& solution = localizer.solution();
-  return drifted_covariance(solution.covariance, map.T_map_anchor.inverse() * solution.T_map_camera, map.anchor_covariance);
+  InheritedDrift inherited;
+  for (auto first = anchors.cbegin(); first != anchors.cend();) {
+    const auto last = std::upper_bound(first, anchors.cend(), *first);
+    const SnapshotAnchor& anchor = map.anchors[*first];
+    inherited.add(static_cast<int>(last - first), anchor.T_map_camera.inverse() * solution.T_map_camera, anchor.covariance);
+    first = last;
+  }
+  return inherited.covariance(solution.covariance);
 }
 
 /// Keeps what the next frame is predicted from.

@@ -1,6 +1,6 @@
 // Whether the covariance of the pose is honest: the normalised estimation error squared over synthetic worlds.
 //
-//   consistency_bench FIRST_SEED LAST_SEED [DURATION_S]
+//   consistency_bench FIRST_SEED LAST_SEED [DURATION_S [DRIFT_FACTOR]]
 //
 // Tracker and mapper take turns over room, office and corridor without people, 320x240 at 30 Hz, DURATION_S (40) of each world and
 // seed. The map's frame is fixed by the first frame, so the truth is known in it and nothing is aligned. Printed for each run and
@@ -8,26 +8,21 @@
 // chi-squared, the share below the one-sided 95 % bound, and its mean, for the whole pose (6 degrees of freedom), its rotation and
 // its translation (3 each); and the root mean square of error over stated sigma for each axis.
 //
-// Last, how the rates of drift would do otherwise: the poses do not depend on their covariance, so the chain of anchors of all runs
-// is gone through again with other rates (slam/drift_model.h), and the share within the band is printed for each pair.
+// DRIFT_FACTOR is mapper.drift_factor.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <Eigen/Cholesky>
 
 #include "config/config_loader.h"
 #include "core/frame_pool.h"
 #include "drivers/synthetic_camera.h"
-#include "slam/drift_model.h"
 #include "slam/mapper.h"
 #include "slam/tracker.h"
 
@@ -88,49 +83,6 @@ struct Statistics {
   }
 };
 
-/// What the covariance of a frame or a keyframe is made of.
-struct Link {
-  KeyframeId keyframe = kNoKeyframe;  ///< none: a frame
-  KeyframeId anchor = kNoKeyframe;    ///< the keyframe itself where it has none
-  Se3 T_anchor_camera;
-  Matrix6d given_map = Matrix6d::Zero();
-  Vector6d xi = Vector6d::Zero();  ///< error of a frame
-};
-
-/// The statistics that the frames of a run would have had.
-void replay(const std::vector<Link>& chain, const DriftRates& rates, Statistics& statistics) {
-  std::map<KeyframeId, Matrix6d> covariances;
-  for (const Link& link : chain) {
-    const Matrix6d covariance = link.keyframe == link.anchor && link.keyframe != kNoKeyframe
-                                    ? Matrix6d(link.given_map + start_covariance())
-                                    : drifted_covariance(link.given_map, link.T_anchor_camera, covariances.at(link.anchor), rates);
-    if (link.keyframe == kNoKeyframe) {
-      statistics.count(link.xi, covariance);
-    } else {
-      covariances[link.keyframe] = covariance;
-    }
-  }
-}
-
-void print_other_rates(const std::vector<std::vector<Link>>& chains) {
-  constexpr std::array<double, 7> kFactors{0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0};
-  std::printf("share in band, by the rates of drift\n  mrad \\ mm ");
-  for (const double f : kFactors) {
-    std::printf(" %6.2f", 1e3 * f * DriftRates{}.sigma_m);
-  }
-  for (const double f_rotation : kFactors) {
-    std::printf("\n  %9.2f ", 1e3 * f_rotation * DriftRates{}.sigma_rad);
-    for (const double f : kFactors) {
-      Statistics statistics;
-      for (const std::vector<Link>& chain : chains) {
-        replay(chain, {f_rotation * DriftRates{}.sigma_rad, f * DriftRates{}.sigma_m}, statistics);
-      }
-      std::printf(" %6.3f", static_cast<double>(statistics.pose.in_band) / statistics.pose.frames);
-    }
-  }
-  std::printf("\n");
-}
-
 class Run {
  public:
   Run(const Config& config, SyntheticWorldKind world, std::int64_t seed, double duration_s)
@@ -146,8 +98,7 @@ class Run {
     name_ = std::string(world_name(world)) + " " + std::to_string(seed);
   }
 
-  /// Returns what the covariances were made of.
-  std::vector<Link> go(Statistics& all) {
+  void go(Statistics& all) {
     Statistics statistics;
     for (std::uint64_t i = 0; i < camera_->total_frames(); ++i) {
       FrameWriter frame = *pool_.acquire();
@@ -159,46 +110,25 @@ class Run {
         const Vector6d xi = (estimate.T_map_camera().inverse() * truth(i)).log();
         statistics.count(xi, estimate.covariance);
         all.count(xi, estimate.covariance);
-        link_frame(estimate, xi);
       } else if (i > 0) {
         ++statistics.without_pose;
         ++all.without_pose;
       }
       if (estimate.keyframe || estimate.asks_where) {
-        map(estimate);
+        map();
       }
     }
     statistics.print(name_ + " (" + std::to_string(mapper_.counters().loops_closed) + " loops)");
-    return std::move(chain_);
   }
 
  private:
   Se3 truth(std::uint64_t index) const { return camera_->pose(0).inverse() * camera_->pose(index); }
 
-  void map(const PoseEstimate& estimate) {
+  void map() {
     mapper_.insert(record_);
     while (mapper_.improve({})) {
     }
     mapper_.write_snapshot(snapshot_);
-    if (estimate.keyframe) {
-      keyframes_.push_back(record_.id);
-    }
-    const auto found = std::find_if(keyframes_.begin(), keyframes_.end(), [this](KeyframeId id) {
-      const std::optional<Se3> pose = mapper_.keyframe_pose(id);
-      return pose && pose->translation() == snapshot_.T_map_anchor.translation();
-    });
-    anchor_ = found == keyframes_.end() ? kNoKeyframe : *found;
-    if (estimate.keyframe) {
-      const Se3 T_map_keyframe = *mapper_.keyframe_pose(record_.id);
-      chain_.push_back(
-          {record_.id, anchor_, snapshot_.T_map_anchor.inverse() * T_map_keyframe, record_.covariance, Vector6d::Zero()});
-    }
-  }
-
-  void link_frame(const PoseEstimate& estimate, const Vector6d& xi) {
-    const Se3 T_anchor_camera = snapshot_.T_map_anchor.inverse() * estimate.T_map_camera();
-    const Matrix6d inherited = drifted_covariance(Matrix6d::Zero(), T_anchor_camera, snapshot_.anchor_covariance);
-    chain_.push_back({kNoKeyframe, anchor_, T_anchor_camera, estimate.covariance - inherited, xi});
   }
 
   std::string name_;
@@ -208,9 +138,6 @@ class Run {
   Mapper mapper_;
   MapSnapshot snapshot_;
   KeyframeRecord record_;
-  std::vector<KeyframeId> keyframes_;
-  KeyframeId anchor_ = kNoKeyframe;
-  std::vector<Link> chain_;
 };
 
 }  // namespace
@@ -219,19 +146,18 @@ class Run {
 int main(int argc, char** argv) {
   using namespace posed;
   if (argc < 3) {
-    std::fputs("usage: consistency_bench FIRST_SEED LAST_SEED [DURATION_S]\n", stderr);
+    std::fputs("usage: consistency_bench FIRST_SEED LAST_SEED [DURATION_S [DRIFT_FACTOR]]\n", stderr);
     return EXIT_FAILURE;
   }
   const double duration_s = argc > 3 ? std::atof(argv[3]) : 40.0;
-  const Config config = default_config().value();
+  Config config = default_config().value();
+  config.mapper.drift_factor = argc > 4 ? std::atof(argv[4]) : config.mapper.drift_factor;
   Statistics all;
-  std::vector<std::vector<Link>> chains;
   for (std::int64_t seed = std::atol(argv[1]); seed <= std::atol(argv[2]); ++seed) {
     for (const SyntheticWorldKind world : {SyntheticWorldKind::Room, SyntheticWorldKind::Office, SyntheticWorldKind::Corridor}) {
-      chains.push_back(Run(config, world, seed, duration_s).go(all));
+      Run(config, world, seed, duration_s).go(all);
     }
   }
   all.print("all");
-  print_other_rates(chains);
   return EXIT_SUCCESS;
 }
