@@ -45,7 +45,7 @@ inline float larger(float a, float b) {
 /// Rounds a value that is already in steps from the zero point's zero.
 inline std::uint8_t to_u8(float value) {
   const float low = value < 0.0F ? 0.0F : value;
-  const float clamped = low > 255.0F ? 255.0F : low;
+  const float clamped = low < 255.0F ? low : 255.0F;  // also what is no number, which no integer could hold
   return static_cast<std::uint8_t>(static_cast<std::int32_t>(clamped + 0.5F));
 }
 
@@ -325,7 +325,7 @@ inline float exponential(float x) {
   constexpr float kLn2High = 0.693359375F;  // few enough bits that its product with n is exact
   constexpr float kLn2Low = -2.12194440e-4F;
   const float low = x < -87.0F ? -87.0F : x;
-  const float inside = low > 87.0F ? 87.0F : low;
+  const float inside = low < 87.0F ? low : 87.0F;                            // also what is no number, which no integer could hold
   const auto n = static_cast<std::int32_t>(inside * kLog2E + 126.5F) - 126;  // rounds, as what it truncates is positive
   const auto whole = static_cast<float>(n);
   const float r = (inside - whole * kLn2High) - whole * kLn2Low;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -202,6 +203,18 @@ TEST_P(TensorKernelsOf, SigmoidIsExactEnoughEverywhere) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double expected = 1 / (1 + std::exp(-static_cast<double>(values[i])));
     ASSERT_NEAR(result[i], expected, 1e-6 * expected + 1e-37) << values[i];
+  }
+}
+
+TEST_P(TensorKernelsOf, WhatIsNoNumberBecomesSomeNumber) {
+  std::vector<float> values(9, std::numeric_limits<float>::quiet_NaN());
+  std::vector<std::uint8_t> bytes(values.size());
+  kernels().quantize(values.data(), values.size(), {0.1F, 20}, bytes.data());
+  EXPECT_EQ(bytes, std::vector<std::uint8_t>(9, 255));
+  kernels().sigmoid(values.data(), values.size());
+  for (const float value : values) {
+    EXPECT_GE(value, 0);
+    EXPECT_LE(value, 1);
   }
 }
 
