@@ -225,7 +225,8 @@ class Training:
             writer.writerow(row)
         print(row, flush=True)
 
-    def run(self) -> None:
+    def run(self, last_step: int | None = None) -> None:
+        """To the end, or to `last_step`; whatever is left is done by another run from the checkpoint."""
         augmentation = Augmentation()
         batches = Batches(self.samples, self.settings, augmentation, self.args.seed, self.steps, self.step)
         loader = torch.utils.data.DataLoader(batches, batch_size=None, shuffle=False, num_workers=self.args.workers,
@@ -254,7 +255,7 @@ class Training:
                 sums, count, reported = {}, 0, time.monotonic()
             if done:
                 return
-            if self.args.stop_after_min and now - begun > 60 * self.args.stop_after_min:
+            if self.step == last_step or (self.args.stop_after_min and now - begun > 60 * self.args.stop_after_min):
                 save_checkpoint(self.checkpoint_path, self.state())
                 print(f"stopped at step {self.step} of {self.steps}; the same command goes on from here", flush=True)
                 return
