@@ -135,7 +135,8 @@ def degrade(image: np.ndarray, options: Augmentation, rng: np.random.Generator) 
             angle = rng.uniform(0, np.pi)
             reach = 0.5 * (length - 1) * np.array([np.cos(angle), np.sin(angle)])
             middle = np.array([length - 1, length - 1]) / 2
-            cv2.line(kernel, tuple(np.round(middle - reach).astype(int).tolist()), tuple(np.round(middle + reach).astype(int).tolist()), 1.0)
+            start, end = (np.round(p).astype(int).tolist() for p in (middle - reach, middle + reach))
+            cv2.line(kernel, start, end, 1.0)
             image = cv2.filter2D(image, -1, kernel / kernel.sum())
     if rng.random() < options.noise:
         noise = rng.normal(0, rng.uniform(2, 12), image.shape).astype(np.float32)

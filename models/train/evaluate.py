@@ -10,7 +10,9 @@ import csv
 import time
 from pathlib import Path
 
+import cv2
 import numpy as np
+import torch
 
 from boxes import iou_matrix
 from dataset import DataError, Sample, read_folder
@@ -62,7 +64,10 @@ def main() -> int:
     parser.add_argument("--overlap", type=float, default=0.5, help="least intersection over union of a box that counts as found")
     parser.add_argument("--least-area", type=float, default=0.0, help="share of the image; smaller people are left out")
     parser.add_argument("--curve", type=Path, help="CSV file for the recall, precision and score of each box of the last model")
+    parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
+    torch.set_num_threads(args.threads)
+    cv2.setNumThreads(args.threads)
     try:
         samples = read_folder(args.data)
         print(f"{len(samples)} images, {sum(len(s.boxes) for s in samples)} boxes")

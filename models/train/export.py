@@ -47,8 +47,8 @@ def export(network: Yolo, anchors: np.ndarray, classes: list[str], name: str, wi
     torch.onnx.export(folded(network), torch.zeros(1, 3, height, width), str(path), opset_version=OPSET, input_names=[INPUT],
                       output_names=outputs, do_constant_folding=True)
     model = onnx.load(str(path))
-    properties = {"posed.name": name, "posed.classes": classes, "posed.strides": list(strides), "posed.anchors": np.asarray(anchors).tolist(),
-                  "posed.input": [3, height, width]}
+    properties = {"posed.name": name, "posed.classes": classes, "posed.strides": list(strides),
+                  "posed.anchors": np.asarray(anchors).tolist(), "posed.input": [3, height, width]}
     onnx.helper.set_model_props(model, {key: json.dumps(value) for key, value in properties.items()})
     onnx.checker.check_model(model)
     onnx.save(model, str(path))

@@ -84,7 +84,8 @@ def main() -> int:
     except DataError as error:
         print(f"table1.py: {error}")
         return 65
-    print(f"\n| width {args.width:g} | AP@0.5 | parameters | at width 0.5 | ms at {args.size[0]}x{args.size[1]} |\n| --- | --- | --- | --- | --- |")
+    print(f"\n| width {args.width:g} | AP@0.5 | parameters | at width 0.5 | ms at {args.size[0]}x{args.size[1]} |")
+    print("| --- | --- | --- | --- | --- |")
     for row in rows:
         print(f"| {row.name} | {row.ap:.3f} | {row.parameters:,} | {row.full_parameters:,} | {row.ms:.1f} |")
     return 0

@@ -285,7 +285,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--save-min", type=float, default=3.0, help="minutes between checkpoints")
     parser.add_argument("--report-min", type=float, default=10.0, help="minutes between reports")
     parser.add_argument("--time-budget-min", type=float, default=0.0,
-                        help="the schedule ends when all sessions of the run have taken so many minutes, if the epochs have not by then; 0: by epochs alone")
+                        help="the schedule ends when the sessions of the run together have taken so many minutes, if not before; 0: by epochs")
     parser.add_argument("--stop-after-min", type=float, default=0.0, help="stop after so many minutes, to go on later; 0: at the end")
     return parser.parse_args(arguments)
 

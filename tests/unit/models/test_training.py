@@ -42,8 +42,8 @@ class WithImages(unittest.TestCase):
         write_images(self.path / "data")
 
     def training(self, out: str, *more: str) -> Training:
-        arguments = ["--data", str(self.path / "data"), "--out", str(self.path / out), "--width", "0.125", "--width-px", "64", "--height-px", "64",
-                     "--batch", "3", "--epochs", "2", "--warm-up-steps", "2", "--workers", "0", "--device", "cpu", *more]
+        arguments = ["--data", str(self.path / "data"), "--out", str(self.path / out), "--width", "0.125", "--width-px", "64",
+                     "--height-px", "64", "--batch", "3", "--epochs", "2", "--warm-up-steps", "2", "--workers", "0", "--device", "cpu", *more]
         with contextlib.redirect_stdout(io.StringIO()):
             return Training(parse_arguments(arguments))
 
