@@ -35,7 +35,8 @@ def fit_anchors(sizes: np.ndarray, count: int, seed: int = 0, restarts: int = 5,
             if assigned is not None and (nearest == assigned).all():
                 break
             assigned = nearest
-            centres = np.array([np.median(sizes[assigned == i], 0) if (assigned == i).any() else centres[i] for i in range(count)])
+            # The mean of each cluster (eq. 9); one that lost all its boxes stays where it is.
+            centres = np.array([sizes[assigned == i].mean(0) if (assigned == i).any() else centres[i] for i in range(count)])
         overlap = size_iou(sizes, centres).max(1).mean()
         if overlap > best_overlap:
             best, best_overlap = centres, overlap

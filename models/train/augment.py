@@ -20,6 +20,8 @@ class Augmentation:
     scale: tuple[float, float] = (0.6, 1.6)
     stretch: float = 0.25  # largest change of the proportions: the training images are squeezed
     mirror: float = 0.5
+    quarter_turn: float = 0.06  # probability of an image turned by 90 degrees: people who lie
+    paste: float = 0.15  # probability of a person cut out of another image by the box
     hue: float = 0.015
     saturation: float = 0.6
     brightness: float = 0.45
@@ -74,6 +76,41 @@ def place(canvas: np.ndarray, area: tuple[int, int, int, int], sample: Sample, w
     return sample.labels[seen], (cut[seen] + [x0, y0, x0, y0]).astype(np.float32)
 
 
+def turned(sample: Sample, clockwise: bool) -> Sample:
+    """The sample turned by a quarter."""
+    height, width = sample.image.shape[:2]
+    x0, y0, x1, y1 = sample.boxes.T
+    if clockwise:
+        image, boxes = cv2.rotate(sample.image, cv2.ROTATE_90_CLOCKWISE), (height - y1, x0, height - y0, x1)
+    else:
+        image, boxes = cv2.rotate(sample.image, cv2.ROTATE_90_COUNTERCLOCKWISE), (y0, width - x1, y1, width - x0)
+    return Sample(sample.path, image, sample.labels, np.stack(boxes, 1))
+
+
+def paste_person(image: np.ndarray, labels: np.ndarray, boxes: np.ndarray, other: Sample, options: Augmentation, rng: np.random.Generator):
+    """Puts a person of another image where nobody is, with a soft border; returns labels and boxes. Too small people are left."""
+    if not len(other.boxes) or rng.random() >= options.paste:
+        return labels, boxes
+    i = rng.integers(len(other.boxes))
+    x0, y0, x1, y1 = other.boxes[i].astype(int)
+    piece = other.image[y0:y1, x0:x1]
+    scale = rng.uniform(0.6, 1.5)
+    width, height = int((x1 - x0) * scale), int((y1 - y0) * scale)
+    if min(width, height) < 16 or width >= image.shape[1] or height >= image.shape[0]:
+        return labels, boxes
+    x, y = int(rng.integers(image.shape[1] - width)), int(rng.integers(image.shape[0] - height))
+    box = np.array([x, y, x + width, y + height], np.float32)
+    if len(boxes) and ((np.minimum(boxes[:, 2:], box[2:]) - np.maximum(boxes[:, :2], box[:2])).min(1) > 0).any():
+        return labels, boxes
+    border = max(min(width, height) // 12, 1)
+    alpha = np.zeros((height, width, 1), np.float32)
+    alpha[border : height - border, border : width - border] = 1
+    alpha = cv2.blur(alpha, (2 * border + 1, 2 * border + 1))[..., None]
+    area = image[y : y + height, x : x + width]
+    area[:] = (alpha * cv2.resize(piece, (width, height), interpolation=cv2.INTER_AREA) + (1 - alpha) * area).astype(np.uint8)
+    return np.append(labels, other.labels[i]), np.vstack((boxes, box))
+
+
 def recolour(image: np.ndarray, options: Augmentation, rng: np.random.Generator) -> np.ndarray:
     gains = 1 + rng.uniform(-1, 1, 3) * [options.hue, options.saturation, options.brightness]
     hue, saturation, value = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2HSV))
@@ -98,7 +135,8 @@ def degrade(image: np.ndarray, options: Augmentation, rng: np.random.Generator) 
             angle = rng.uniform(0, np.pi)
             reach = 0.5 * (length - 1) * np.array([np.cos(angle), np.sin(angle)])
             middle = np.array([length - 1, length - 1]) / 2
-            cv2.line(kernel, tuple(np.round(middle - reach).astype(int).tolist()), tuple(np.round(middle + reach).astype(int).tolist()), 1.0)
+            start, end = (np.round(p).astype(int).tolist() for p in (middle - reach, middle + reach))
+            cv2.line(kernel, start, end, 1.0)
             image = cv2.filter2D(image, -1, kernel / kernel.sum())
     if rng.random() < options.noise:
         noise = rng.normal(0, rng.uniform(2, 12), image.shape).astype(np.float32)
@@ -134,8 +172,10 @@ def augmented(samples: list[Sample], index: int, width: int, height: int, option
         chosen = [samples[index]] + [samples[i] for i in rng.integers(len(samples), size=3)]
     else:
         areas, chosen = [(0, 0, width, height)], [samples[index]]
+    chosen = [turned(s, rng.random() < 0.5) if rng.random() < options.quarter_turn else s for s in chosen]
     parts = [place(canvas, area, sample, crop_window(sample, options, rng), options) for area, sample in zip(areas, chosen)]
     labels, boxes = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+    labels, boxes = paste_person(canvas, labels, boxes, samples[rng.integers(len(samples))], options, rng)
     canvas = occlude(canvas, boxes, samples[rng.integers(len(samples))], options, rng)
     canvas = degrade(recolour(canvas, options, rng), options, rng)
     if rng.random() < options.mirror:

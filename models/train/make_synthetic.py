@@ -52,8 +52,9 @@ def main() -> int:
     for seed in range(args.seeds[0], args.seeds[1] + 1):
         for people, seconds in ((1, args.seconds), (0, args.seconds / 3)):
             with tempfile.TemporaryDirectory() as folder:
+                mode = "walking" if seed % 2 else "sitting"
                 subprocess.run([args.posectl, "synth", "--out", folder, "--force", "--quiet", "--seed", str(seed), "--people", str(people),
-                                "--mode", "walking" if seed % 2 else "sitting", "--duration", str(seconds)], check=True, stdout=subprocess.DEVNULL)
+                                "--mode", mode, "--duration", str(seconds)], check=True, stdout=subprocess.DEVNULL)
                 images = sorted((Path(folder) / "rgb").iterdir())
                 masks = sorted((Path(folder) / "masks").iterdir())
                 for i in range(0, len(images), args.every):

@@ -37,6 +37,15 @@ class NetworkOptions:
         return asdict(self)
 
 
+class Silu(nn.SiLU):
+    """x * sigmoid(x). In bfloat16 PyTorch's own is several times slower on a processor than in float, so it is taken in float there."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        if x.dtype == torch.bfloat16:
+            return functional.silu(x.float()).to(x.dtype)
+        return super().forward(x)
+
+
 class Conv(nn.Module):
     """Convolution, batch normalisation and SiLU; the size is kept but for the stride."""
 
@@ -44,7 +53,7 @@ class Conv(nn.Module):
         super().__init__()
         self.conv = nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, groups=groups, bias=False)
         self.bn = nn.BatchNorm2d(outputs, eps=1e-3, momentum=0.03)
-        self.act = nn.SiLU(inplace=True) if act else nn.Identity()
+        self.act = Silu(inplace=True) if act else nn.Identity()
 
     def forward(self, x: Tensor) -> Tensor:
         return self.act(self.bn(self.conv(x)))

@@ -66,11 +66,16 @@ class MovingAverage:
 
 
 class Batches(torch.utils.data.Dataset):
-    """Batch number `step` is a function of the seed and the step alone, so that a resumed run sees what it would have seen."""
+    """Batch number `step` is a function of the seed and the step alone, so that a resumed run sees what it would have seen.
+
+    (With a time budget, the step from which there are no mosaics depends on the time that was taken.) `late` is shared with the processes
+    that make batches: how near the end of a run that goes by time is, cannot be told from the number of steps.
+    """
 
     def __init__(self, samples: list[Sample], settings: Settings, augmentation: Augmentation, seed: int, steps: int, first: int):
         self.samples, self.settings, self.augmentation = samples, settings, augmentation
         self.seed, self.steps, self.first = seed, steps, first
+        self.late = torch.zeros(1, dtype=torch.bool).share_memory_()
 
     def __len__(self) -> int:
         return self.steps - self.first
@@ -81,7 +86,7 @@ class Batches(torch.utils.data.Dataset):
         per_epoch = max(len(self.samples) // s.batch, 1)
         order = np.random.default_rng((self.seed, step // per_epoch)).permutation(len(self.samples))
         rng = np.random.default_rng((self.seed, 1, step))
-        mosaics = step < s.close_mosaic * self.steps
+        mosaics = step < s.close_mosaic * self.steps and not self.late
         options = self.augmentation if mosaics else replace(self.augmentation, mosaic=0.0)
         images, targets = [], []
         for i in range(s.batch):
@@ -93,10 +98,10 @@ class Batches(torch.utils.data.Dataset):
         return torch.stack(images), torch.tensor(targets, dtype=torch.float32).reshape(-1, 6)
 
 
-def rate_at(step: int, steps: int, s: Settings) -> float:
-    """Linear warm-up, then a cosine down to `final_rate`."""
+def rate_at(step: int, progress: float, s: Settings) -> float:
+    """Linear warm-up over the first steps, then a cosine of the progress (0 to 1) down to `final_rate`."""
     warm = min(1.0, (step + 1) / max(s.warm_up_steps, 1))
-    cosine = s.final_rate + (1 - s.final_rate) * 0.5 * (1 + math.cos(math.pi * step / steps))
+    cosine = s.final_rate + (1 - s.final_rate) * 0.5 * (1 + math.cos(math.pi * progress))
     return s.learning_rate * warm * cosine
 
 
@@ -185,9 +190,14 @@ class Training:
                 "input": [self.settings.width_px, self.settings.height_px], "network": self.network.state_dict(),
                 "ema": self.ema.network.state_dict(), "optimizer": self.optimizer.state_dict(), "step": self.step, "seconds": self.seconds}
 
+    def progress(self) -> float:
+        """0 at the beginning, 1 at the end: by steps, or by the time that was taken where that is further."""
+        by_time = self.seconds / (60 * self.args.time_budget_min) if self.args.time_budget_min else 0.0
+        return min(max(self.step / self.steps, by_time), 1.0)
+
     def learn(self, images: Tensor, targets: Tensor) -> dict[str, float]:
         for group in self.optimizer.param_groups:
-            group["lr"] = rate_at(self.step, self.steps, self.settings)
+            group["lr"] = rate_at(self.step, self.progress(), self.settings)
         x = images.to(self.device).contiguous(memory_format=torch.channels_last).float() / 255
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.args.bf16):
             heads = self.network(x)
@@ -215,7 +225,8 @@ class Training:
             writer.writerow(row)
         print(row, flush=True)
 
-    def run(self) -> None:
+    def run(self, last_step: int | None = None) -> None:
+        """To the end, or to `last_step`; whatever is left is done by another run from the checkpoint."""
         augmentation = Augmentation()
         batches = Batches(self.samples, self.settings, augmentation, self.args.seed, self.steps, self.step)
         loader = torch.utils.data.DataLoader(batches, batch_size=None, shuffle=False, num_workers=self.args.workers,
@@ -224,6 +235,9 @@ class Training:
         count = 0
         begun = saved = reported = time.monotonic()
         before = self.seconds
+        if self.progress() >= 1:
+            print(f"done already, after {self.step} steps", flush=True)
+            return
         self.network.train()
         for images, targets in loader:
             for name, value in self.learn(images, targets).items():
@@ -231,13 +245,17 @@ class Training:
             count += 1
             now = time.monotonic()
             self.seconds = before + now - begun
-            if now - saved > 60 * self.args.save_min or self.step == self.steps:
+            batches.late[0] = self.progress() >= self.settings.close_mosaic
+            done = self.progress() >= 1
+            if done or now - saved > 60 * self.args.save_min:
                 save_checkpoint(self.checkpoint_path, self.state())
                 saved = now
-            if now - reported > 60 * self.args.report_min or self.step == self.steps:
+            if done or now - reported > 60 * self.args.report_min:
                 self.report(sums, count)
                 sums, count, reported = {}, 0, time.monotonic()
-            if self.args.stop_after_min and now - begun > 60 * self.args.stop_after_min:
+            if done:
+                return
+            if self.step == last_step or (self.args.stop_after_min and now - begun > 60 * self.args.stop_after_min):
                 save_checkpoint(self.checkpoint_path, self.state())
                 print(f"stopped at step {self.step} of {self.steps}; the same command goes on from here", flush=True)
                 return
@@ -266,7 +284,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--save-min", type=float, default=3.0, help="minutes between checkpoints")
     parser.add_argument("--report-min", type=float, default=10.0, help="minutes between reports")
-    parser.add_argument("--stop-after-min", type=float, default=0.0, help="stop after so many minutes; 0: at the end")
+    parser.add_argument("--time-budget-min", type=float, default=0.0,
+                        help="the schedule ends when the sessions of the run together have taken so many minutes, if not before; 0: by epochs")
+    parser.add_argument("--stop-after-min", type=float, default=0.0, help="stop after so many minutes, to go on later; 0: at the end")
     return parser.parse_args(arguments)
 
 

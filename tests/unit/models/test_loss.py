@@ -1,0 +1,96 @@
+from __future__ import annotations
+
+import math
+import unittest
+
+import numpy as np
+import torch
+
+from boxes import complete_iou, iou_matrix, suppress_overlaps
+from loss import DetectionLoss, match_targets
+
+
+class Overlaps(unittest.TestCase):
+    def test_iou_by_hand(self):
+        a = np.array([[0.0, 0, 10, 10]])
+        b = np.array([[0.0, 0, 10, 10], [5, 5, 15, 15], [20, 20, 30, 30], [2, 2, 4, 4]])
+        np.testing.assert_allclose(iou_matrix(a, b)[0], [1, 25 / 175, 0, 4 / 100])
+
+    def test_complete_iou_by_hand(self):
+        """Zheng et al. 2020: overlap, less the distance of the centres, less the difference of the proportions."""
+        same = torch.tensor([[5.0, 5, 4, 8]])
+        self.assertAlmostEqual(float(complete_iou(same, same)), 1.0, places=5)
+        shifted = torch.tensor([[8.0, 5, 4, 8]])  # joint 1 x 8; both in a box of 7 x 8; centres 3 apart
+        self.assertAlmostEqual(float(complete_iou(shifted, same)), 8 / 56 - 9 / 113, places=5)
+        wide = torch.tensor([[5.0, 5, 8, 4]])  # joint 4 x 4 of 48; the centres agree
+        v = 4 / math.pi**2 * (math.atan(8 / 4) - math.atan(4 / 8)) ** 2
+        self.assertAlmostEqual(float(complete_iou(wide, same)), 1 / 3 - v * v / (1 - 1 / 3 + v), places=5)
+
+    def test_descending_the_loss_moves_a_box_to_its_target(self):
+        truth = torch.tensor([[5.0, 5, 6, 8]])
+        for predicted, up in (([8.0, 3, 6, 8], (-1, 1)), ([2.0, 5.5, 6, 8], (1, -1))):
+            box = torch.tensor([predicted], requires_grad=True)
+            complete_iou(box, truth).sum().backward()
+            self.assertEqual(tuple(box.grad[0, :2].sign().tolist()), up)
+        for predicted, up in (([5.0, 5, 3, 4], (1, 1)), ([5.0, 5, 9, 12], (-1, -1))):
+            box = torch.tensor([predicted], requires_grad=True)
+            complete_iou(box, truth).sum().backward()
+            self.assertEqual(tuple(box.grad[0, 2:].sign().tolist()), up)
+
+    def test_suppression_keeps_the_most_confident_of_a_heap(self):
+        boxes = np.array([[0.0, 0, 10, 10], [1, 0, 11, 10], [30, 30, 40, 40], [0, 1, 10, 11]])
+        kept = suppress_overlaps(boxes, np.array([0.6, 0.9, 0.3, 0.5]), 0.5)
+        self.assertEqual(kept.tolist(), [1, 2])
+
+
+class Matching(unittest.TestCase):
+    anchors = torch.tensor([[2.0, 4.0], [20.0, 40.0]])
+
+    def match(self, x: float, y: float, w: float, h: float, rows: int = 10, columns: int = 12):
+        image, anchor, row, column, _, box = match_targets(torch.tensor([[1.0, 0, x, y, w, h]]), self.anchors, rows, columns, 4.0)
+        self.assertTrue((image == 1).all())
+        return sorted(zip(anchor.tolist(), column.tolist(), row.tolist())), box
+
+    def test_own_cell_and_the_two_nearest_neighbours(self):
+        cells, box = self.match(5.2, 3.7, 2, 4)
+        self.assertEqual(cells, [(0, 4, 3), (0, 5, 3), (0, 5, 4)])
+        self.assertTrue(((box[:, :2] >= -0.5) & (box[:, :2] <= 1.5)).all())  # what the decoding can reach
+        self.assertEqual(box[:, 2:].tolist(), [[2, 4]] * 3)
+
+    def test_no_neighbour_outside_of_the_image(self):
+        self.assertEqual(self.match(0.3, 9.8, 2, 4)[0], [(0, 0, 9)])
+
+    def test_anchors_by_the_ratio_of_the_sides(self):
+        self.assertEqual({c[0] for c in self.match(5.2, 3.7, 7.9, 15.9)[0]}, {0, 1})
+        self.assertEqual({c[0] for c in self.match(5.2, 3.7, 8.1, 16.1)[0]}, {1})
+        self.assertEqual(self.match(5.2, 3.7, 0.4, 4)[0], [])
+
+
+class Loss(unittest.TestCase):
+    def setUp(self):
+        anchors = torch.tensor([[[8.0, 16]] * 3, [[32.0, 64]] * 3, [[64.0, 128]] * 3])
+        self.loss = DetectionLoss(anchors, (8, 16, 32), 1)
+        self.heads = tuple(torch.zeros(1, 18, 64 // s, 64 // s, requires_grad=True) for s in (8, 16, 32))
+
+    def gradients(self, targets: torch.Tensor) -> list[torch.Tensor]:
+        total, _ = self.loss(self.heads, targets)
+        total.backward()
+        return [h.grad.view(3, 6, *h.shape[2:]) for h in self.heads]
+
+    def test_without_people_objectness_goes_down_everywhere_and_nothing_else_moves(self):
+        for gradient in self.gradients(torch.zeros(0, 6)):
+            self.assertTrue((gradient[:, 4] > 0).all())
+            gradient[:, 4] = 0
+            self.assertEqual(float(gradient.abs().max()), 0.0)
+
+    def test_objectness_goes_up_only_where_the_person_is(self):
+        """A box of 8 x 16 in the middle of the cell (row 3, column 2) of the finest layer, which predicts just that at first."""
+        fine, middle, coarse = self.gradients(torch.tensor([[0.0, 0, 20, 28, 8, 16]]))
+        up = (fine[:, 4] < 0).nonzero().tolist()
+        self.assertEqual(up, [[0, 3, 2], [1, 3, 2], [2, 3, 2]])
+        self.assertTrue((middle[:, 4] > 0).any() and (coarse[:, 4] > 0).all())
+
+    def test_a_perfect_box_costs_nothing(self):
+        for width, height, perfect in ((8, 16, True), (12, 16, False)):
+            _, parts = self.loss(self.heads, torch.tensor([[0.0, 0, 20, 28, width, height]]))
+            self.assertEqual(parts["box"] < 1e-5, perfect)
