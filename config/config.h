@@ -94,7 +94,7 @@ enum class DetectorHead { Anchors, Boxes, Yolox };  ///< detect/box_decoder.h
 
 struct DetectorConfig {
   bool enabled = true;
-  std::vector<std::string> models{"person-s.posednet", "person-m.posednet", "person-l.posednet"};  ///< from cheap to costly
+  std::vector<std::string> models{"person-small.posednet", "person-medium.posednet"};  ///< from cheap to costly
   double budget_s = 0.033;  ///< after which a frame is given up (not in lockstep)
   int lockstep_model = 1;   ///< index into `models`, of the one that looks in lockstep
   double score = 0.4;       ///< least confidence
