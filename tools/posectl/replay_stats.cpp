@@ -62,9 +62,15 @@ std::string to_json(const ReplayStats& stats) {
       {"loops_closed", health.loops_closed},
       {"maps_joined", health.maps_joined},
       {"relocalizations", health.relocalizations},
+      {"detector_model", health.detector_model},
+      {"detected", health.detected},
+      {"detections_abandoned", health.detections_abandoned},
+      {"detector_errors", health.detector_errors},
       {"track_ms", latency_json(health.track)},
       {"latency_ms", latency_json(health.latency)},
       {"map_ms", latency_json(health.map)},
+      {"detect_ms", latency_json(health.detect)},
+      {"detect_overrun_ms", latency_json(health.detect_overrun)},
       {"peak_rss_bytes", health.peak_rss_bytes},
   };
   // Paths in the description need not be UTF-8, JSON must be.
@@ -80,7 +86,7 @@ std::string format_replay_summary(const ReplayStats& stats) {
                      share, health.frames_lost, frames_dropped(health), health.frames_skipped) +
          fmt::format("map          {} keyframes, {} landmarks\n", health.map_keyframes, health.map_landmarks) +
          latency_line("track [ms]", health.track) + latency_line("latency [ms]", health.latency) +
-         latency_line("map [ms]", health.map) +
+         latency_line("map [ms]", health.map) + (health.detected > 0 ? latency_line("detect [ms]", health.detect) : "") +
          fmt::format("time         {:.1f} s, {:.0f} MB at most\n", stats.wall_s, static_cast<double>(health.peak_rss_bytes) * 1e-6);
 }
 

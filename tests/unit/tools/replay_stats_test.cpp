@@ -40,7 +40,7 @@ TEST(ReplayStats, JsonHoldsCountersAndQuantiles) {
   EXPECT_EQ(
       json.at("track_ms"),
       nlohmann::json::parse(R"({"p50": 8.0, "p95": 9.0, "p99": 10.0, "p999": 11.0, "max": 12.0, "mean": 8.25, "count": 474})"));
-  for (const char* key : {"latency_ms", "map_ms"}) {
+  for (const char* key : {"latency_ms", "map_ms", "detect_ms", "detect_overrun_ms"}) {
     EXPECT_EQ(json.at(key).at("count"), 0) << key;
   }
   EXPECT_FALSE(json.at("version").get<std::string>().empty());
