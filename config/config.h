@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "config/detector_config.h"
 #include "core/pinhole_camera.h"
 #include "core/se3.h"
 
@@ -83,25 +84,6 @@ struct MapConfig {
   std::string file;              ///< loaded at start and saved; empty: neither
   double save_period_s = 300.0;  ///< 0: at shutdown and on request alone
   MapMode mode = MapMode::Mapping;
-};
-
-enum class DetectorEngine {
-  Posed,   ///< the project's runner, which can be stopped between any two of its steps
-  OpenCv,  ///< OpenCV's DNN module
-};
-
-enum class DetectorHead { Anchors, Boxes, Yolox };  ///< detect/box_decoder.h
-
-struct DetectorConfig {
-  bool enabled = true;
-  std::vector<std::string> models{"person-small.posednet", "person-medium.posednet"};  ///< from cheap to costly
-  double budget_s = 0.033;  ///< after which a frame is given up (not in lockstep)
-  int lockstep_model = 1;   ///< index into `models`, of the one that looks in lockstep
-  double score = 0.4;       ///< least confidence
-  double iou = 0.5;         ///< of two boxes that overlap by more, one goes
-  DetectorEngine engine = DetectorEngine::Posed;
-  DetectorHead head = DetectorHead::Anchors;
-  int person_class = 0;  ///< of the model's classes
 };
 
 struct PublisherConfig {

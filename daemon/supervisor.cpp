@@ -1,5 +1,6 @@
 #include "daemon/supervisor.h"
 
+#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <memory>
@@ -21,6 +22,14 @@ constexpr std::size_t kSourceErrorsKept = 16;  // between two looks
 void notify_systemd(const std::string& state) {
   sd_notify(0, state.c_str());
 }  // does nothing without $NOTIFY_SOCKET
+
+// A library may have started threads before main (OpenBLAS does, where it stands in for the BLAS that OpenCV links). They do not
+// block our signals, and the kernel may hand them one.
+pthread_t event_thread;
+
+extern "C" void forward_to_event_thread(int signal) {
+  pthread_kill(event_thread, signal);
+}
 
 }  // namespace
 
@@ -84,11 +93,18 @@ class Supervisor::EventLoop {
 Supervisor::Supervisor(SupervisorOptions options) : options_(options), source_errors_(kSourceErrorsKept) {}
 
 Status Supervisor::block_signals() {
+  event_thread = pthread_self();
+  struct sigaction forward {};
+  forward.sa_handler = forward_to_event_thread;
+  forward.sa_flags = SA_RESTART;
   sigset_t signals;
   sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGUSR1);
+  for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) {
+    sigaddset(&signals, signal);
+    if (sigaction(signal, &forward, nullptr) != 0) {
+      return make_error(ErrorCode::Unavailable, fmt::format("signal {} cannot be handled: {}", signal, std::strerror(errno)));
+    }
+  }
   if (const int error = pthread_sigmask(SIG_BLOCK, &signals, nullptr); error != 0) {
     return make_error(ErrorCode::Unavailable, fmt::format("the signals cannot be blocked: {}", std::strerror(error)));
   }

@@ -29,7 +29,7 @@ class Supervisor {
   explicit Supervisor(SupervisorOptions options);
 
   /// Blocks the signals that the daemon acts on in the calling thread and those it starts, so that the event loop alone receives
-  /// them: call it before any thread exists.
+  /// them: call it before the daemon starts any thread. Threads that libraries have started before main pass theirs on.
   static Status block_signals();
 
   /// For AppOptions::on_source_error: passes errors from the capture thread to the log without waiting for the log.

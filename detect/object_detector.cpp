@@ -57,6 +57,7 @@ Result<RunOutcome> ObjectDetector::detect(ImageView<const std::uint8_t> bgr, con
     for (Detection& candidate : candidates_) {
       candidate.box = letterbox_.to_image(candidate.box);
     }
+    std::erase_if(candidates_, [](const Detection& d) { return d.box.area() <= 0; });  // beside the image
     found.assign(candidates_);
     end_ns = deadline.clock->now_ns();
     ++outcome->steps_run;

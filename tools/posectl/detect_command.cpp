@@ -86,7 +86,8 @@ void draw_box(ImageView<std::uint8_t> bgr, const BoundingBox& box) {
   }
 }
 
-Result<std::unique_ptr<ObjectDetector>> load_model(const DetectOptions& options) {
+/// The detector, and the file it runs.
+Result<std::pair<std::unique_ptr<ObjectDetector>, std::string>> load_model(const DetectOptions& options) {
   const Result<Config> config = options.config.empty() ? default_config() : load_config(options.config);
   if (!config) {
     return tl::unexpected<Error>(config.error());
@@ -98,7 +99,12 @@ Result<std::unique_ptr<ObjectDetector>> load_model(const DetectOptions& options)
   if (options.model.empty() && detector.models.empty()) {
     return make_error(ErrorCode::InvalidConfig, "the configuration names no model; name one by --model");
   }
-  return load_object_detector(detector, options.model.empty() ? detector.models.back() : options.model);
+  const std::string file = options.model.empty() ? detector.models.back() : options.model;
+  Result<std::unique_ptr<ObjectDetector>> loaded = load_object_detector(detector, file);
+  if (!loaded) {
+    return tl::unexpected<Error>(loaded.error());
+  }
+  return std::pair(std::move(*loaded), std::filesystem::path(file).filename().string());
 }
 
 std::string table_row(const std::string& name, const Detection& d) {
@@ -130,10 +136,11 @@ int run_detect(const DetectOptions& options, const Console& console) {
   if (!prepared) {
     return report_error(console.err, prepared.error());
   }
-  const Result<std::unique_ptr<ObjectDetector>> detector = load_model(options);
-  if (!detector) {
-    return report_error(console.err, detector.error());
+  const auto loaded = load_model(options);
+  if (!loaded) {
+    return report_error(console.err, loaded.error());
   }
+  const auto& [detector, model] = *loaded;
   const Clock& clock = SystemClock::instance();
   const InterruptGuard interrupt;
   ProgressReporter progress(console.err, progress_style(console.err_is_terminal, options.quiet), "detect", images->size(),
@@ -154,7 +161,7 @@ int run_detect(const DetectOptions& options, const Console& console) {
       exit_code = report_error(console.err, read.error());  // the others are looked at all the same
       continue;
     }
-    if (const Result<RunOutcome> outcome = (*detector)->detect(image.bgr(), Deadline{}, found); !outcome) {
+    if (const Result<RunOutcome> outcome = detector->detect(image.bgr(), Deadline{}, found); !outcome) {
       return report_error(console.err, outcome.error());
     }
     const std::string name = path.stem().string();
@@ -180,7 +187,7 @@ int run_detect(const DetectOptions& options, const Console& console) {
     fmt::print(console.out, "{:<28} {:>6} {:>8} {:>8} {:>8} {:>8}\n{}", "image", "score", "x_min", "y_min", "x_max", "y_max",
                table);
   }
-  fmt::print(console.out, "{} people in {} images, by {}\n", people, done, (*detector)->name());
+  fmt::print(console.out, "{} people in {} images, by {} ({})\n", people, done, model, detector->name());
   return exit_code;
 }
 

@@ -217,7 +217,8 @@ TEST_F(ConfigLoader, UnknownKeysGetTheNearestKnownOne) {
   EXPECT_EQ(error_of("features = 20"), "posed.toml:1:1: features: 20: unknown key; did you mean tracker.features?");
   EXPECT_EQ(error_of("[mapper]\nspeed = \"high\""),
             "posed.toml:2:1: mapper.speed: \"high\": unknown key; allowed here: max_keyframes, max_landmarks, local_landmarks, "
-            "local_keyframes, recovery_keyframes, bundle_keyframes, bundle_iterations, bundle_budget_s, loop_closing, "
+            "local_keyframes, recovery_keyframes, bundle_keyframes, bundle_iterations, bundle_budget_s, drift_factor, "
+            "loop_closing, "
             "loop_max_drift");
   EXPECT_EQ(error_of("quux = 1"), "posed.toml:1:1: quux: 1: unknown key; allowed are only keys in tables, such as [tracker]");
   EXPECT_EQ(
@@ -232,8 +233,8 @@ TEST_F(ConfigLoader, UnknownTablesAreReportedOnce) {
             "posed.toml:1:11: pipeline.captur: unknown table; did you mean pipeline.capture?");
   EXPECT_EQ(error_of("[quantum]\nspin.up = 1"),
             "posed.toml:1:2: quantum: unknown table; allowed here: source, source.replay, source.synthetic, camera, tracker, "
-            "mapper, map, "
-            "publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, pipeline.publisher, logging");
+            "mapper, map, detector, publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, pipeline.detector, "
+            "pipeline.publisher, logging");
 }
 
 TEST_F(ConfigLoader, DuplicatesAndSyntaxErrors) {
@@ -283,8 +284,11 @@ TEST_F(ConfigLoader, RulesBetweenKeys) {
       error_of("[mapper]\nmax_keyframes = 200\nlocal_keyframes = 201"),
       "posed.toml:3:19: mapper.local_keyframes: 201: mapper.local_keyframes (201) must be at most mapper.max_keyframes (200)");
   EXPECT_EQ(error_of("[pipeline]\nframe_queue = 15"),
-            "posed.toml:2:15: pipeline.frame_queue: 15: pipeline.frame_slots (16) must be at least pipeline.frame_queue (15) + 2");
-  for (const std::string thread : {"capture", "tracker", "mapper", "publisher"}) {
+            "posed.toml:2:15: pipeline.frame_queue: 15: pipeline.frame_slots (16) must be at least pipeline.frame_queue (15) + 5");
+  EXPECT_EQ(error_of("[detector]\nenabled = false\n[pipeline]\nframe_queue = 15"),
+            "posed.toml:4:15: pipeline.frame_queue: 15: pipeline.frame_slots (16) must be at least pipeline.frame_queue (15) + 2");
+  EXPECT_EQ(error_of("[detector]\nmodels = []").substr(0, 57), "posed.toml:2:10: detector.models: []: names no file; set d");
+  for (const std::string thread : {"capture", "tracker", "mapper", "detector", "publisher"}) {
     EXPECT_EQ(error_of("[pipeline." + thread + "]\npolicy = \"fifo\""), "posed.toml:2:10: pipeline." + thread +
                                                                             ".policy: \"fifo\": policy \"fifo\" needs pipeline." +
                                                                             thread + ".priority from 1 to 99");

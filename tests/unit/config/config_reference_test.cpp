@@ -107,6 +107,7 @@ void satisfy_rules(Config& c) {
   c.source.replay.sequence = "/recordings/\"quoted\" \\ \t\xC3\xA9";
   c.source.synthetic.people = c.source.synthetic.world == SyntheticWorldKind::Room ? c.source.synthetic.people : 0;
   c.map.file = "/maps/hall";
+  c.detector.enabled = false;  // the models would come back as paths
   c.tracker.fast_threshold_minimum = std::min(c.tracker.fast_threshold_minimum, c.tracker.fast_threshold);
   c.tracker.min_inliers = std::min(c.tracker.min_inliers, c.tracker.features - 1);
   c.mapper.local_keyframes = std::min(c.mapper.local_keyframes, c.mapper.max_keyframes);

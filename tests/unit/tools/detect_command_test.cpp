@@ -64,7 +64,7 @@ TEST_F(DetectCommand, WritesLinesOfNameScoreAndBox) {
   const std::string csv = folder / "boxes.txt";
   const Outcome outcome = detect({"--model", kSmallOnnx, "--score", "0.01", "--csv", csv, "--quiet", folder / ""});
   ASSERT_EQ(outcome.exit_code, kExitOk) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("in 2 images, by small"));
+  EXPECT_THAT(outcome.out, HasSubstr("in 2 images, by small.onnx (posed f32)"));
   std::istringstream lines(read(csv));
   std::string name;
   double score = 0;
