@@ -114,7 +114,8 @@ void satisfy_rules(Config& c) {
   c.mapper.recovery_keyframes = std::min(c.mapper.recovery_keyframes, c.mapper.max_keyframes);
   c.pipeline.frame_slots = std::max(c.pipeline.frame_slots, c.pipeline.frame_queue + 2);
   c.tracker.pyramid_levels = std::min(c.tracker.pyramid_levels, 3);
-  for (ThreadConfig* thread : {&c.pipeline.capture, &c.pipeline.tracker, &c.pipeline.mapper, &c.pipeline.publisher}) {
+  for (ThreadConfig* thread :
+       {&c.pipeline.capture, &c.pipeline.tracker, &c.pipeline.mapper, &c.pipeline.detector, &c.pipeline.publisher}) {
     thread->priority = std::max(thread->priority, 1);
   }
 }
