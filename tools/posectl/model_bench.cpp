@@ -50,7 +50,11 @@ Status add_engine(Result<std::unique_ptr<Engine>> made, const std::filesystem::p
 }
 
 Status add_engines(const ModelBenchRequest& request, const std::filesystem::path& file, std::vector<BenchEngine>& engines) {
+  const bool by_opencv = request.against_opencv && file.extension() == ".onnx";
   const Result<Network> network = load_network(file);
+  if (!network && network.error().code == ErrorCode::Unsupported && by_opencv) {
+    return add_engine(OpenCvNetwork::create(file), file, engines);  // one of another kind, to compare with
+  }
   if (!network) {
     return tl::unexpected<Error>(network.error());
   }
@@ -62,7 +66,7 @@ Status add_engines(const ModelBenchRequest& request, const std::filesystem::path
   if (added && request.int8 && (!network->ranges().empty() || !request.float32)) {
     added = add_engine(NetworkRunner::create(*network, Precision::Int8), file, engines);
   }
-  if (added && request.against_opencv && file.extension() == ".onnx") {
+  if (added && by_opencv) {
     added = add_engine(OpenCvNetwork::create(file), file, engines);
   }
   return added;

@@ -111,6 +111,7 @@ TEST_F(DetectionPipelineTest, LockstepLooksAtEveryFrameUnhurried) {
 }
 
 TEST_F(DetectionPipelineTest, ADetectorThatNeverEndsDelaysNobody) {
+  config_.pipeline.publish_queue = 256;  // so that none is lost where the publisher's thread waits for a processor
   std::counting_semaphore<> go{0};
   std::atomic<int> frames{0};
   detector_.outcome = [&](const RgbdFrame&) {
