@@ -3,7 +3,8 @@
 
 The truth is a folder of images and labels, as for training, or a text file of lines `name x_min y_min x_max y_max` [pixels, the centre
 of the first one 0]. Names are those of the boxes: of the image without its ending, or the stamp. An image of the truth without any box
-that was written counts as one in which nobody was found; boxes of images that the truth does not know are an error.
+that was written counts as one in which nobody was found. Boxes of images that the truth does not name are an error or, with --others-empty,
+false: nobody is there.
 """
 from __future__ import annotations
 
@@ -49,10 +50,13 @@ def area(boxes: np.ndarray) -> np.ndarray:
     return (boxes[:, 2:] - boxes[:, :2]).prod(1)
 
 
-def compare(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], overlap: float, least_area: float) -> AveragePrecision:
+def compare(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], overlap: float, least_area: float,
+            others_empty: bool = False) -> AveragePrecision:
     """People smaller than `least_area` [pixels^2] count neither as missed nor, when found, as false."""
     unknown = sorted(set(found) - set(truth))
-    if unknown:
+    if others_empty:
+        truth = truth | {name: np.zeros((0, 4)) for name in unknown}
+    elif unknown:
         raise DataError(f"boxes of {unknown[0]} and {len(unknown) - 1} more, of which the truth says nothing")
     ap = AveragePrecision(overlap)
     for name, boxes in truth.items():
@@ -71,10 +75,11 @@ def main() -> int:
     parser.add_argument("truth", type=Path)
     parser.add_argument("--overlap", type=float, default=0.5, help="least intersection over union of a box that counts as found")
     parser.add_argument("--least-area", type=float, default=0.0, help="[pixels^2] smaller people are left out")
+    parser.add_argument("--others-empty", action="store_true", help="images that the truth does not name show nobody")
     args = parser.parse_args()
     try:
         truth = read_truth(args.truth)
-        ap = compare(read_rows(args.found, 5), truth, args.overlap, args.least_area)
+        ap = compare(read_rows(args.found, 5), truth, args.overlap, args.least_area, args.others_empty)
     except DataError as error:
         print(f"evaluate_boxes.py: {error}")
         return 65

@@ -42,6 +42,10 @@ class EvaluateBoxes(unittest.TestCase):
         with self.assertRaisesRegex(DataError, "boxes of x"):
             compare({"x": [[0.5, 0, 0, 1, 1]]}, {}, 0.5, 0.0)
 
+    def test_images_that_the_truth_does_not_name_may_be_empty_ones(self):
+        ap = compare({"x": [[0.5, 0, 0, 9, 9]]}, {}, 0.5, 0.0, others_empty=True)
+        self.assertEqual((ap.truths, ap.hits), (0, [False]))
+
 
 if __name__ == "__main__":
     unittest.main()
