@@ -188,7 +188,7 @@ PlaceViews synthetic_place_views(int rooms, int per_room, int queries_per_room) 
     }
     return views;
   }
-  const double step_s = SyntheticTrajectory::kPeriod_s / per_room;
+  const double step_s = SweepTrajectory::kPeriod_s / per_room;
   for (int seed = 1; seed <= rooms; ++seed) {
     Room room(seed);
     HashRng random(static_cast<std::uint32_t>(seed));
