@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "config/detector_config.h"
+#include "config/dynamic_config.h"
 #include "core/pinhole_camera.h"
 #include "core/se3.h"
 
@@ -125,6 +126,7 @@ struct Config {
   MapperConfig mapper;
   MapConfig map;
   DetectorConfig detector;
+  DynamicConfig dynamic;
   PublisherConfig publisher;
   PipelineConfig pipeline;
   LoggingConfig logging;

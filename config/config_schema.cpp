@@ -232,6 +232,18 @@ void add_detector(SchemaBuilder& schema, DetectorConfig& c) {
       .key("person_class", integer(c.person_class, 0, 100'000), "", "Which of the networks' classes is a person.");
 }
 
+void add_dynamic(SchemaBuilder& schema, DynamicConfig& c) {
+  schema.section("dynamic", "What moves is kept out of the geometry.")
+      .key("mode", choice(c.mode, {{"off", DynamicMode::Off}, {"boxes", DynamicMode::Boxes}, {"full", DynamicMode::Full}}), "",
+           "`off` takes everything for the static world; `boxes` leaves whole boxes of detected people out; `full` cuts people out "
+           "by depth, carries them from frame to frame, and finds by depth alone what moves without being a person.")
+      .key("max_detection_age_s", real(c.max_detection_age_s, 0.0, 10.0), "s", "Older detections are not used.")
+      .key("memory_s", real(c.memory_s, 0.1, 60.0), "s",
+           "What moved, and a person, is left out for so long after the last sign of it.")
+      .key("lockstep_lag", integer(c.lockstep_lag, 0, 30), "frames",
+           "By how many frames detections come late in `lockstep`, where no clock may decide.");
+}
+
 void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {
   schema.section("publisher", "What is published over LCM.")
       .key("url", TextField{&c.url, {"an LCM address such as \"udpm://239.255.76.67:7667?ttl=0\"", is_lcm_url}}, "",
@@ -283,6 +295,7 @@ Schema config_schema(Config& config) {
   add_mapper(schema, config.mapper);
   add_map(schema, config.map);
   add_detector(schema, config.detector);
+  add_dynamic(schema, config.dynamic);
   add_publisher(schema, config.publisher);
   add_pipeline(schema, config.pipeline);
   schema.section("logging", "Messages for people, on standard error.")

@@ -41,6 +41,9 @@ struct PoseEstimate {
   bool keyframe = false;          ///< the frame was handed to the mapper as a keyframe
   bool asks_where = false;        ///< the frame was handed to the mapper to be relocalised
   TimeNs detection_age_ns = -1;   ///< age of the person detections used; -1 where none were
+  float masked_share = 0;         ///< of the image that shows movers, 0 to 1: the pose does not rest on it
+  std::int32_t people = 0;        ///< movers that a detection explains
+  std::int32_t other_movers = 0;  ///< movers that only their motion gives away
 
   /// The keyframe this pose hangs on, and the pose relative to it: what a final trajectory is rebuilt from after the map has moved.
   std::uint64_t reference_keyframe = 0;

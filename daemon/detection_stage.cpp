@@ -7,16 +7,20 @@
 
 namespace posed {
 
-DetectionStage::DetectionStage(FrameDetector* detector, NewestFrameLink& in, DetectionsLink& out,
-                               std::function<void()> wake_publisher)
-    : detector_(detector), in_(in), out_(out), wake_publisher_(std::move(wake_publisher)) {}
+DetectionStage::DetectionStage(FrameDetector* detector, Links links, std::function<void()> wake_publisher, int lockstep_lag)
+    : detector_(detector),
+      links_(links),
+      wake_publisher_(std::move(wake_publisher)),
+      delayed_(static_cast<std::size_t>(lockstep_lag) + 1) {}
 
 void DetectionStage::run(const std::stop_token& stop) {
   Detections found;
-  in_.consume(stop, [&](const RgbdFrame& frame) {
+  links_.frames.consume(stop, [&](const RgbdFrame& frame) {
     const Result<DetectionOutcome> outcome = detector_->detect(frame, found);
     note(outcome);
     if (outcome && outcome->finished) {
+      links_.tracker.back() = found;
+      links_.tracker.publish();
       hand_on(found);
     }
   });
@@ -27,18 +31,23 @@ void DetectionStage::detect_unhurried(const RgbdFrame& frame, const std::stop_to
   Detections found;
   const Result<DetectionOutcome> outcome = detector_->detect_unhurried(frame, found);
   note(outcome);
-  if (outcome && outcome->finished && out_.wait_for_room(stop)) {
+  const bool finished = outcome && outcome->finished;
+  delayed_[next_delayed_] = finished ? found : Detections{};
+  next_delayed_ = (next_delayed_ + 1) % delayed_.size();
+  links_.tracker.back() = delayed_[next_delayed_];  // the oldest
+  links_.tracker.publish();
+  if (finished && links_.publisher.wait_for_room(stop)) {
     hand_on(found);
   }
 }
 
 void DetectionStage::close_output() {
-  out_.close();
+  links_.publisher.close();
   wake_publisher_();
 }
 
 void DetectionStage::hand_on(const Detections& found) {
-  if (const std::optional<Detections> oldest = out_.ring.push(found)) {
+  if (const std::optional<Detections> oldest = links_.publisher.ring.push(found)) {
     dropped_.add();
   }
   wake_publisher_();

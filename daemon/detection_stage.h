@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <functional>
 #include <stop_token>
+#include <vector>
 
 #include "core/detections.h"
+#include "core/latest_value.h"
 #include "core/metrics.h"
 #include "core/rgbd_frame.h"
 #include "daemon/detector_port.h"
@@ -19,16 +21,24 @@ namespace posed {
 /// which is thread-safe.
 class DetectionStage {
  public:
+  struct Links {
+    NewestFrameLink& frames;
+    DetectionsLink& publisher;
+    LatestValue<Detections>& tracker;
+  };
+
   /// `detector` may be null: then nobody is looked for. Everything passed in must outlive the stage. `wake_publisher` is called
-  /// after something was put into `out`, or it was closed.
-  DetectionStage(FrameDetector* detector, NewestFrameLink& in, DetectionsLink& out, std::function<void()> wake_publisher);
+  /// after something was put into the publisher's link, or it was closed. `lockstep_lag`: frames by which the tracker gets
+  /// detections late in lockstep.
+  DetectionStage(FrameDetector* detector, Links links, std::function<void()> wake_publisher, int lockstep_lag);
 
   bool is_enabled() const { return detector_ != nullptr; }
 
-  /// The thread's body in real time. Closes `out` when `in` has ended.
+  /// The thread's body in real time. Closes the publisher's link when the frames have ended.
   void run(const std::stop_token& stop);
 
-  /// In lockstep: every frame, as long as it takes; waits where the publisher is behind.
+  /// In lockstep: every frame, as long as it takes; waits where the publisher is behind. Then the tracker learns what was found
+  /// `lockstep_lag` frames ago.
   void detect_unhurried(const RgbdFrame& frame, const std::stop_token& stop);
 
   /// Tells the publisher that nothing follows.
@@ -41,10 +51,11 @@ class DetectionStage {
   void hand_on(const Detections& found);
 
   FrameDetector* detector_;
-  NewestFrameLink& in_;
-  DetectionsLink& out_;
+  Links links_;
   std::function<void()> wake_publisher_;
-  bool complained_ = false;  // of the engine
+  bool complained_ = false;         // of the engine
+  std::vector<Detections> delayed_;  // in lockstep, a ring: those that the tracker does not know yet
+  std::size_t next_delayed_ = 0;
 
   Counter detected_;
   Counter abandoned_;

@@ -44,7 +44,9 @@ struct Links {
         keyframes(size_of(config.pipeline.keyframe_queue)),
         estimates(size_of(config.pipeline.publish_queue)),
         detections(kDetectionsQueue) {
-    keyframes.ring.prepare([&](KeyframeRecord& record) { record.reserve(feature_capacity(config.tracker.features)); });
+    keyframes.ring.prepare([&](KeyframeRecord& record) {
+      record.reserve(feature_capacity(config.tracker.features), size_of(config.mapper.local_landmarks));
+    });
     snapshots.prepare([&](MapSnapshot& snapshot) {
       snapshot.landmarks.reserve(size_of(config.mapper.local_landmarks));
       snapshot.anchors.reserve(size_of(config.mapper.max_keyframes));
@@ -66,6 +68,7 @@ struct Links {
   LatestValue<MapSnapshot> snapshots;
   EstimateLink estimates;
   DetectionsLink detections;
+  LatestValue<Detections> newest_detections;  // for the tracker
 };
 
 class Pipeline final : public App {
@@ -77,12 +80,13 @@ class Pipeline final : public App {
               size_of(config.pipeline.frame_slots) + parts_.source->info().slots_held),
         links_(config),
         capture_(*parts_.source, pool_, std::move(options.on_source_error)),
-        tracking_(*parts_.tracker, {links_.snapshots, links_.keyframes, links_.estimates}, clock,
+        tracking_(*parts_.tracker, {links_.snapshots, links_.newest_detections, links_.keyframes, links_.estimates}, clock,
                   is_lockstep() ? FullQueue::Waits : FullQueue::DropsOldest),
         saver_(*parts_.mapper, options.map_files.value_or(map_files(config.map)),
                is_lockstep() ? 0 : from_seconds(config.map.save_period_s), clock),
         mapping_(*parts_.mapper, links_.keyframes, links_.snapshots, saver_, clock),
-        detection_(parts_.detector.get(), links_.newest_frame, links_.detections, [this] { links_.estimates.wake_all(); }),
+        detection_(parts_.detector.get(), {links_.newest_frame, links_.detections, links_.newest_detections},
+                   [this] { links_.estimates.wake_all(); }, config.dynamic.lockstep_lag),
         publish_({links_.estimates, links_.detections}, make_publisher(clock),
                  {std::move(options.on_estimate), std::move(options.on_detections)}, clock) {}
 

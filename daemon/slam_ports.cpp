@@ -11,11 +11,12 @@ class SlamTracker final : public FrameTracker {
  public:
   explicit SlamTracker(const Config& config)
       // T_map_start places base at start; the tracker thinks in the camera's frame.
-      : tracker_(config.tracker, config.mapper, config.map.mode, config.intrinsics,
+      : tracker_(config.tracker, config.mapper, config.dynamic, config.map.mode, config.intrinsics,
                  config.camera.T_map_start * config.camera.T_base_camera) {}
 
-  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) override {
-    return tracker_.track(frame, map, candidate);
+  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest,
+                     KeyframeRecord* candidate) override {
+    return tracker_.track(frame, map, newest, candidate);
   }
 
  private:

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "config/config.h"
+#include "core/detections.h"
 #include "core/estimates.h"
 #include "core/result.h"
 #include "core/rgbd_frame.h"
@@ -19,7 +20,8 @@ namespace posed {
 class FrameTracker {
  public:
   virtual ~FrameTracker() = default;
-  virtual PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) = 0;
+  virtual PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest,
+                             KeyframeRecord* candidate) = 0;
 };
 
 /// The mapper as the pipeline sees it (slam/mapper.h). Thread-bound.

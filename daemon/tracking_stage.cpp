@@ -4,18 +4,19 @@
 
 namespace posed {
 
-TrackingStage::TrackingStage(FrameTracker& tracker, Outputs outputs, const Clock& clock, FullQueue full_queue)
-    : tracker_(tracker), outputs_(outputs), clock_(clock), full_queue_(full_queue) {}
+TrackingStage::TrackingStage(FrameTracker& tracker, Links links, const Clock& clock, FullQueue full_queue)
+    : tracker_(tracker), links_(links), clock_(clock), full_queue_(full_queue) {}
 
 void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
-  outputs_.snapshots.refresh();
-  KeyframeRecord* const candidate = outputs_.keyframes.ring.claim();
+  links_.snapshots.refresh();
+  links_.detections.refresh();
+  KeyframeRecord* const candidate = links_.keyframes.ring.claim();
   if (candidate == nullptr) {
     keyframes_delayed_.add();
   }
 
   const TimeNs begin_ns = clock_.now_ns();
-  PoseEstimate estimate = tracker_.track(frame, outputs_.snapshots.front(), candidate);
+  PoseEstimate estimate = tracker_.track(frame, links_.snapshots.front(), &links_.detections.front(), candidate);
   estimate.track_ns = clock_.now_ns() - begin_ns;
 
   track_time_.record(estimate.track_ns);
@@ -23,20 +24,20 @@ void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
   (estimate.has_pose() ? tracked_ : lost_).add();
   if ((estimate.keyframe || estimate.asks_where) && candidate != nullptr) {
     keyframes_.add(estimate.keyframe ? 1 : 0);
-    outputs_.keyframes.ring.commit();
-    outputs_.keyframes.notify_arrived();
+    links_.keyframes.ring.commit();
+    links_.keyframes.notify_arrived();
   }
   hand_on(estimate, stop);
 }
 
 void TrackingStage::hand_on(const PoseEstimate& estimate, const std::stop_token& stop) {
-  if (full_queue_ == FullQueue::Waits && !outputs_.estimates.wait_for_room(stop)) {
+  if (full_queue_ == FullQueue::Waits && !links_.estimates.wait_for_room(stop)) {
     return;
   }
-  if (const std::optional<PoseEstimate> oldest = outputs_.estimates.ring.push(estimate)) {
+  if (const std::optional<PoseEstimate> oldest = links_.estimates.ring.push(estimate)) {
     poses_dropped_.add();
   }
-  outputs_.estimates.notify_arrived();
+  links_.estimates.notify_arrived();
 }
 
 void TrackingStage::run(const std::stop_token& stop, FrameLink& in) {
@@ -51,8 +52,8 @@ void TrackingStage::run(const std::stop_token& stop, FrameLink& in) {
 }
 
 void TrackingStage::close_outputs() {
-  outputs_.keyframes.close();
-  outputs_.estimates.close();
+  links_.keyframes.close();
+  links_.estimates.close();
 }
 
 void TrackingStage::report(HealthReport& health) const {

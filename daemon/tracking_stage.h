@@ -4,6 +4,7 @@
 #include <stop_token>
 
 #include "core/clock.h"
+#include "core/detections.h"
 #include "core/latest_value.h"
 #include "core/metrics.h"
 #include "daemon/health.h"
@@ -24,14 +25,15 @@ enum class FullQueue {
 /// does not wait for another stage.
 class TrackingStage {
  public:
-  struct Outputs {
+  struct Links {
     LatestValue<MapSnapshot>& snapshots;  ///< read here, written by the mapper
+    LatestValue<Detections>& detections;  ///< read here, written by the detector
     KeyframeLink& keyframes;
     EstimateLink& estimates;
   };
 
   /// Everything passed in must outlive the stage.
-  TrackingStage(FrameTracker& tracker, Outputs outputs, const Clock& clock, FullQueue full_queue);
+  TrackingStage(FrameTracker& tracker, Links links, const Clock& clock, FullQueue full_queue);
 
   void track(const RgbdFrame& frame, const std::stop_token& stop);
 
@@ -47,7 +49,7 @@ class TrackingStage {
   void hand_on(const PoseEstimate& estimate, const std::stop_token& stop);
 
   FrameTracker& tracker_;
-  Outputs outputs_;
+  Links links_;
   const Clock& clock_;
   FullQueue full_queue_;
 

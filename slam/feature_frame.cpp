@@ -31,6 +31,7 @@ FeatureFrame::FeatureFrame(const PinholeCamera& camera, std::size_t capacity) {
   features_.reserve(capacity);
   ideal_pixels_.reserve(capacity);
   depth_m_.reserve(capacity);
+  trust_.reserve(capacity);
   disparity_.reserve(capacity);
   cell_keypoints_.reserve(capacity);
   cell_of_.reserve(capacity);
@@ -45,6 +46,12 @@ int FeatureFrame::row_of(float v) const {
 }
 
 void FeatureFrame::place(const PinholeCamera& camera, ImageView<const float> depth_m) {
+  look_up(camera, depth_m);
+  complete(camera);
+}
+
+void FeatureFrame::look_up(const PinholeCamera& camera, ImageView<const float> depth_m) {
+  trust_.assign(size(), 1.0F);
   ideal_pixels_.resize(size());
   depth_m_.resize(size());
   for (std::size_t i = 0; i < size(); ++i) {
@@ -52,7 +59,14 @@ void FeatureFrame::place(const PinholeCamera& camera, ImageView<const float> dep
     ideal_pixels_[i] = camera.undistort({k.x, k.y}).cast<float>();
     depth_m_[i] = depth_at(depth_m, k.x, k.y);
   }
-  complete(camera);
+}
+
+void FeatureFrame::shrink(std::size_t count) {
+  features_.keypoints.resize(count);
+  features_.descriptors.resize(count);
+  ideal_pixels_.resize(count);
+  depth_m_.resize(count);
+  trust_.resize(count);
 }
 
 void FeatureFrame::place_stored(const PinholeCamera& camera, const Features& features,
@@ -61,6 +75,7 @@ void FeatureFrame::place_stored(const PinholeCamera& camera, const Features& fea
   features_ = features;
   ideal_pixels_ = ideal_pixels;
   depth_m_ = depth_m;
+  trust_.assign(size(), 1.0F);
   complete(camera);
 }
 

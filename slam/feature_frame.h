@@ -23,6 +23,26 @@ class FeatureFrame {
   /// Completes `features()` after the extractor has filled them: undistorts, looks depths up, sorts into the grid.
   void place(const PinholeCamera& camera, ImageView<const float> depth_m);
 
+  /// The same, but `trust_of(keypoint, depth_m)` says how far each keypoint is to be trusted, 0 to 1; those with 0 are left out.
+  template <typename TrustOf>
+  void place(const PinholeCamera& camera, ImageView<const float> depth_m, TrustOf&& trust_of) {
+    look_up(camera, depth_m);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < features_.keypoints.size(); ++i) {
+      const float trust = trust_of(features_.keypoints[i], depth_m_[i]);
+      if (trust > 0) {
+        features_.keypoints[kept] = features_.keypoints[i];
+        features_.descriptors[kept] = features_.descriptors[i];
+        ideal_pixels_[kept] = ideal_pixels_[i];
+        depth_m_[kept] = depth_m_[i];
+        trust_[kept] = trust;
+        ++kept;
+      }
+    }
+    shrink(kept);
+    complete(camera);
+  }
+
   /// Becomes a frame that was placed before: the features, ideal pixels and depths of a stored keyframe, of equal length.
   void place_stored(const PinholeCamera& camera, const Features& features, const std::vector<Eigen::Vector2f>& ideal_pixels,
                     const std::vector<float>& depth_m);
@@ -33,6 +53,7 @@ class FeatureFrame {
 
   const std::vector<Eigen::Vector2f>& ideal_pixels() const { return ideal_pixels_; }
   const std::vector<float>& depth_m() const { return depth_m_; }      ///< 0: none
+  const std::vector<float>& trust() const { return trust_; }          ///< 0 to 1: of the measurement's weight
   const std::vector<float>& disparity() const { return disparity_; }  ///< baseline_fx / depth [pixels]; 0: none
 
   /// Indices of the keypoints within `radius` [pixels] of an ideal pixel along both axes and on a level in [min_level, max_level].
@@ -48,6 +69,8 @@ class FeatureFrame {
   static constexpr int kRows = 36;
   int column_of(float u) const;
   int row_of(float v) const;
+  void look_up(const PinholeCamera& camera, ImageView<const float> depth_m);
+  void shrink(std::size_t count);
   void complete(const PinholeCamera& camera);  // disparities and the grid, out of pixels and depths
 
   float min_u_, min_v_, max_u_, max_v_;  // bounds of the undistorted image
@@ -55,6 +78,7 @@ class FeatureFrame {
   Features features_;
   std::vector<Eigen::Vector2f> ideal_pixels_;
   std::vector<float> depth_m_;
+  std::vector<float> trust_;
   std::vector<float> disparity_;
   std::vector<std::uint16_t> cell_begin_;  // kColumns * kRows + 1 offsets into cell_keypoints_
   std::vector<std::uint16_t> cell_keypoints_;

@@ -61,9 +61,10 @@ bool FrameLocalizer::solve(const MapSnapshot& map, const FeatureFrame& frame, co
     }
     const int level = frame.features().keypoints[i].level;
     const double z = frame.depth_m()[i];
+    const double trust = frame.trust()[i];
     observations_.push_back({map.landmarks[static_cast<std::size_t>(landmark_of_[i])].p_map.cast<double>(),
-                             frame.ideal_pixels()[i].cast<double>(), frame.disparity()[i], noise_.pixel_weight(level),
-                             z > 0 ? noise_.disparity_weight(level, z) : 0.0, true});
+                             frame.ideal_pixels()[i].cast<double>(), frame.disparity()[i], trust * noise_.pixel_weight(level),
+                             z > 0 ? trust * noise_.disparity_weight(level, z) : 0.0, true});
     observed_keypoint_.push_back(static_cast<std::uint16_t>(i));
   }
   solution_ = solve_pose(camera_, initial, observations_);

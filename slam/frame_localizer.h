@@ -31,6 +31,19 @@ class FrameLocalizer {
   /// Solves from the present matches; outliers lose theirs. False where there is no solution.
   bool solve(const MapSnapshot& map, const FeatureFrame& frame, const Se3& initial);
 
+  /// Takes the match of each keypoint that `leaves(index)` names away; says how many there were. `solve` is to follow.
+  template <typename Leaves>
+  int drop_where(Leaves&& leaves) {
+    int dropped = 0;
+    for (std::size_t i = 0; i < landmark_of_.size(); ++i) {
+      if (landmark_of_[i] != kUnmatched && leaves(i)) {
+        landmark_of_[i] = kUnmatched;
+        ++dropped;
+      }
+    }
+    return dropped;
+  }
+
   /// Adds matches with landmarks that have none around the present solution, and solves again. False where fewer than
   /// `min_inliers` agree.
   bool refine(const MapSnapshot& map, const FeatureFrame& frame, int min_inliers);

@@ -39,9 +39,14 @@ struct KeyframeRecord {
   std::vector<Eigen::Vector2f> ideal_pixels;  ///< undistorted keypoints
   std::vector<float> depth_m;                 ///< 0 where the sensor saw none
   std::vector<LandmarkId> landmarks;          ///< matched landmark, or kNoLandmark
+  /// Landmarks that the frame's depth speaks of though no keypoint matches them, both ascending:
+  std::vector<LandmarkId> hidden;   ///< something is in front of them, so that they were not found says nothing
+  std::vector<LandmarkId> refuted;  ///< the camera sees right through their place, or a mover is there: they are gone
 
-  /// Makes room for `capacity` keypoints, so that filling the record does not allocate.
-  void reserve(std::size_t capacity) {
+  /// Makes room for `capacity` keypoints and `local_landmarks` of the map, so that filling the record does not allocate.
+  void reserve(std::size_t capacity, std::size_t local_landmarks) {
+    hidden.reserve(local_landmarks);
+    refuted.reserve(local_landmarks);
     features.reserve(capacity);
     ideal_pixels.reserve(capacity);
     depth_m.reserve(capacity);

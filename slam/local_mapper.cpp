@@ -11,6 +11,12 @@ namespace {
 constexpr double kMinDepth_m = 0.05;
 constexpr std::uint32_t kPredictedBeforeCull = 4;  // keyframes that should have seen a landmark before it is judged
 constexpr double kMinFoundShare = 0.3;
+// How a keyframe changes the log-odds of a landmark's being static: seen again where it was; or seen through (the depth sensor errs
+// at edges, so one look is not enough).
+constexpr float kFoundLogOdds = 0.6F;
+constexpr float kRefutedLogOdds = -1.5F;
+constexpr float kMostLogOdds = 4.0F;
+constexpr float kGoneLogOdds = -1.0F;  // below, it is removed
 constexpr int kLeastShared = 15;             // landmarks that make two keyframes neighbours
 constexpr std::size_t kNeighbours = 10;      // matched with a new keyframe
 constexpr std::size_t kCullNeighbours = 20;  // looked at for redundancy
@@ -70,7 +76,17 @@ void LocalMapper::judge_predicted(const KeyframeRecord& record) {
   for (const LandmarkId id : local.landmarks) {
     Landmark& landmark = *map_.find_landmark(id);
     const bool found = landmark.observations.back().keyframe == record.id;
-    if (!found && !estimator_.in_view(landmark, keyframe.T_map_camera)) {
+    if (found) {
+      landmark.static_log_odds = std::min(kMostLogOdds, landmark.static_log_odds + kFoundLogOdds);
+    } else if (std::binary_search(record.refuted.begin(), record.refuted.end(), id)) {
+      landmark.static_log_odds += kRefutedLogOdds;
+      if (landmark.static_log_odds < kGoneLogOdds) {
+        map_.remove_landmark(id);
+        continue;
+      }
+    }
+    if (!found && (!estimator_.in_view(landmark, keyframe.T_map_camera) ||
+                   std::binary_search(record.hidden.begin(), record.hidden.end(), id))) {
       continue;
     }
     ++landmark.predicted;

@@ -14,6 +14,8 @@ struct Observation {
   std::uint16_t keypoint = 0;  ///< index into the keyframe's features
 };
 
+constexpr float kStaticPrior = 1.0F;  ///< log-odds of a new landmark: nearly three in four are what they seem
+
 /// A point of the static world.
 struct Landmark {
   Eigen::Vector3d p_map = Eigen::Vector3d::Zero();          ///< [m]
@@ -23,6 +25,7 @@ struct Landmark {
   float min_distance_m = 0;
   Descriptor descriptor{};
   std::vector<Observation> observations;  ///< in the order they were made
+  float static_log_odds = kStaticPrior;   ///< of being static, by Bayes' rule; not saved with the map
   std::uint32_t predicted = 0;            ///< keyframes that should have seen it
   std::uint32_t found = 0;                ///< keyframes that did
 

@@ -53,6 +53,7 @@ struct OrbExtractor::Workspace {
   }
 
   void describe_level(int level, Features& features) const;
+  void leave_out(int level, std::span<const std::uint8_t> cells);
 
   const OrbKernels& kernels;
   OrbPyramid pyramid;
@@ -88,6 +89,18 @@ void OrbExtractor::Workspace::describe_level(int level, Features& features) cons
   }
 }
 
+void OrbExtractor::Workspace::leave_out(int level, std::span<const std::uint8_t> cells) {
+  const ImageView<const std::uint8_t> full = pyramid.image(0);
+  const ImageView<const std::uint8_t> image = pyramid.image(level);
+  const int columns = (full.width + kMaskCell - 1) / kMaskCell;
+  std::erase_if(corners, [&](const Corner& corner) {
+    // A corner's centre in whole cells of the full image, without rounding: the same on every machine.
+    const int column = (2 * corner.x + 1) * full.width / (2 * image.width * kMaskCell);
+    const int row = (2 * corner.y + 1) * full.height / (2 * image.height * kMaskCell);
+    return cells[static_cast<std::size_t>(row * columns + column)] != 0;
+  });
+}
+
 OrbExtractor::OrbExtractor(const TrackerConfig& config, int width, int height)
     : OrbExtractor(config, width, height, best_simd_level()) {}
 
@@ -97,7 +110,7 @@ OrbExtractor::OrbExtractor(const TrackerConfig& config, int width, int height, S
 OrbExtractor::~OrbExtractor() = default;
 OrbExtractor::OrbExtractor(OrbExtractor&&) noexcept = default;
 
-void OrbExtractor::extract(ImageView<const std::uint8_t> gray, Features& features) {
+void OrbExtractor::extract(ImageView<const std::uint8_t> gray, Features& features, std::span<const std::uint8_t> left_out) {
   Workspace& w = *workspace_;
   features.keypoints.clear();
   features.descriptors.clear();
@@ -109,6 +122,9 @@ void OrbExtractor::extract(ImageView<const std::uint8_t> gray, Features& feature
       w.pyramid.resize_to(level);
     }
     w.detector.detect(w.pyramid.image(level), w.corners);
+    if (!left_out.empty()) {
+      w.leave_out(level, left_out);
+    }
     w.trees[static_cast<std::size_t>(level)].select(w.corners, w.quotas[static_cast<std::size_t>(level)], w.selected);
     if (!w.selected.empty()) {
       w.pyramid.smooth(level);

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <span>
 
 #include "config/config.h"
 #include "core/image_view.h"
@@ -27,7 +29,11 @@ class OrbExtractor {
 
   /// Replaces `features` by those of `gray`, whose size is that of construction; at most `config.features` (a few more where the
   /// quad-tree's last split gives them), ordered by level, then by position: a function of the pixels alone.
-  void extract(ImageView<const std::uint8_t> gray, Features& features);
+  /// Where `left_out` is given, one entry for each cell of kMaskCell x kMaskCell pixels row by row, there are none in cells whose
+  /// entry is not 0, and as many more elsewhere.
+  void extract(ImageView<const std::uint8_t> gray, Features& features, std::span<const std::uint8_t> left_out = {});
+
+  static constexpr int kMaskCell = 8;  ///< [pixels]
 
  private:
   struct Workspace;

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/clock.h"
 #include "slam/drift_model.h"
 #include "slam/feature_frame.h"
 #include "slam/frame_localizer.h"
 #include "slam/keyframe_recovery.h"
+#include "slam/landmark_visibility.h"
 #include "slam/motion_model.h"
 #include "slam/orb_extractor.h"
 
@@ -22,6 +24,8 @@ constexpr int kFewMatches = 40;
 constexpr KeyframeId kYoungMapKeyframes = 5;  // the only map is not worth finding again where it is lost before it has as many
 constexpr int kRecoveriesPerFrame = 2;        // keyframes tried a frame, so that a lost tracker stays in its time
 constexpr int kMinRecoveryInliers = 15;
+constexpr float kMoverTrust = 0.1F;     // weight of a feature on a mover, where there is too little else
+constexpr float kMuchMasked = 0.2F;     // share of the image without which movers are not to blame for a loss
 constexpr int kCloseTracked = 100;   // fewer close landmarks tracked and...
 constexpr int kCloseUntracked = 70;  // ...more close keypoints unmatched than this asks for a keyframe
 
@@ -32,10 +36,14 @@ TimeNs now_ns() {
 }  // namespace
 
 struct Tracker::Impl {
-  Impl(const TrackerConfig& tracker, const MapperConfig& mapper, MapMode map_mode, const CameraIntrinsics& intrinsics,
-       const Se3& T_map_camera_start);
+  Impl(const TrackerConfig& tracker, const MapperConfig& mapper, const DynamicConfig& dynamic, MapMode map_mode,
+       const CameraIntrinsics& intrinsics, const Se3& T_map_camera_start);
 
-  PoseEstimate track(const RgbdFrame& rgbd, const MapSnapshot& map, KeyframeRecord* candidate);
+  PoseEstimate track(const RgbdFrame& rgbd, const MapSnapshot& map, const Detections* newest, KeyframeRecord* candidate);
+  void extract(const RgbdFrame& rgbd);
+  void extract_warily(const RgbdFrame& rgbd);
+  void leave_movers_out(const MapSnapshot& map);
+  bool is_mover(std::size_t keypoint) const;
   void adopt(const MapSnapshot& map);
   bool can_initialize() const;
   bool is_young() const { return last_keyframe - map_begin < kYoungMapKeyframes; }
@@ -50,7 +58,7 @@ struct Tracker::Impl {
   bool wants_keyframe(const MapSnapshot& map);
   void fill_keyframe(KeyframeRecord& record, const MapSnapshot& map);
   bool may_ask(const MapSnapshot& map) const;
-  void fill_features(KeyframeRecord& record) const;
+  void fill_features(KeyframeRecord& record, const MapSnapshot& map) const;
   Matrix6d covariance_with_drift(const MapSnapshot& map);
   void remember(const MapSnapshot& map);
   void refer_to_keyframe(const MapSnapshot& map, PoseEstimate& estimate) const;
@@ -59,7 +67,9 @@ struct Tracker::Impl {
   MapMode mode;
   PinholeCamera camera;
   OrbExtractor extractor;
+  std::optional<DynamicMask> mask;
   FrameLocalizer localizer;
+  FrameLocalizer spare;  // what to go back to; here to keep its memory
   KeyframeRecovery recovery;
   MotionModel motion;
   Se3 T_map_start;
@@ -69,6 +79,7 @@ struct Tracker::Impl {
   std::uint64_t sequence = 0;
   std::int64_t stamp_utc_ns = 0;  // 0: no frame yet
   bool starts_map = false;
+  bool wary = false;  // features of movers were let in
   Se3 T_map_odom;
   Timing timing;
 
@@ -91,18 +102,67 @@ struct Tracker::Impl {
   std::size_t next_recovery = 0;  // index into the snapshot's keyframes
 };
 
-Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, MapMode map_mode, const CameraIntrinsics& intrinsics,
-                    const Se3& T_map_camera_start)
+Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, const DynamicConfig& dynamic, MapMode map_mode,
+                    const CameraIntrinsics& intrinsics, const Se3& T_map_camera_start)
     : config(tracker),
       mode(map_mode),
       camera(intrinsics),
       extractor(tracker, intrinsics.width, intrinsics.height),
       localizer(camera, tracker, static_cast<std::size_t>(mapper.local_landmarks)),
+      spare(localizer),
       recovery(camera, tracker),
       T_map_start(T_map_camera_start),
       frame(camera, feature_capacity(tracker.features)) {
   last_landmarks.reserve(feature_capacity(config.features));
   anchors.reserve(feature_capacity(config.features));
+  if (dynamic.mode != DynamicMode::Off) {
+    mask.emplace(dynamic, camera);
+  }
+}
+
+/// Features of what is not known to move; as many as without movers, so that the static rest gets more.
+void Tracker::Impl::extract(const RgbdFrame& rgbd) {
+  if (!mask) {
+    extractor.extract(rgbd.gray, frame.features());
+    frame.place(camera, rgbd.depth_m);
+    return;
+  }
+  extractor.extract(rgbd.gray, frame.features(), mask->interior());
+  frame.place(camera, rgbd.depth_m,
+              [this](const Keypoint& k, float depth_m) { return mask->is_mover(k.x, k.y, depth_m) ? 0.0F : 1.0F; });
+}
+
+/// Where what is left does not carry a pose: features of movers too, at little weight. They may stand still, after all, and if they
+/// do not, the others outvote them.
+void Tracker::Impl::extract_warily(const RgbdFrame& rgbd) {
+  extractor.extract(rgbd.gray, frame.features());
+  frame.place(camera, rgbd.depth_m,
+              [this](const Keypoint& k, float depth_m) { return mask->is_mover(k.x, k.y, depth_m) ? kMoverTrust : 1.0F; });
+  localizer.reset(frame);
+}
+
+bool Tracker::Impl::is_mover(std::size_t keypoint) const {
+  const Keypoint& k = frame.features().keypoints[keypoint];
+  return mask && mask->is_mover(k.x, k.y, frame.depth_m()[keypoint]);
+}
+
+/// With the pose known, more may turn out to move than was known before; the pose is then sought once more without it.
+void Tracker::Impl::leave_movers_out(const MapSnapshot& map) {
+  if (!mask) {
+    return;
+  }
+  if (state != TrackingState::Tracking) {
+    mask->settle_lost();
+    return;
+  }
+  if (!mask->settle(T_map_odom.inverse() * localizer.solution().T_map_camera) || starts_map || wary) {
+    return;
+  }
+  spare = localizer;
+  if (localizer.drop_where([this](std::size_t i) { return is_mover(i); }) > 0 &&
+      !(localizer.solve(map, frame, spare.solution().T_map_camera) && localizer.solution().inliers >= config.min_inliers)) {
+    localizer = spare;
+  }
 }
 
 /// A map that was there before the first frame, loaded from a file, is searched before a new one is begun.
@@ -214,28 +274,39 @@ bool Tracker::Impl::wants_keyframe(const MapSnapshot& map) {
          (close_tracked < kCloseTracked && close_untracked > kCloseUntracked);
 }
 
-void Tracker::Impl::fill_features(KeyframeRecord& record) const {
+void Tracker::Impl::fill_features(KeyframeRecord& record, const MapSnapshot& map) const {
   record.sequence = sequence;
   record.map_id = map_id;
   record.T_map_odom = T_map_odom;
   record.starts_map = starts_map;
-  record.features.keypoints = frame.features().keypoints;
-  record.features.descriptors = frame.features().descriptors;
-  record.ideal_pixels = frame.ideal_pixels();
-  record.depth_m = frame.depth_m();
+  record.features.keypoints.clear();
+  record.features.descriptors.clear();
+  record.ideal_pixels.clear();
+  record.depth_m.clear();
+  record.landmarks.clear();
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    if (is_mover(i)) {
+      continue;  // no map shall ever hold one
+    }
+    record.features.keypoints.push_back(frame.features().keypoints[i]);
+    record.features.descriptors.push_back(frame.features().descriptors[i]);
+    record.ideal_pixels.push_back(frame.ideal_pixels()[i]);
+    record.depth_m.push_back(frame.depth_m()[i]);
+    const std::int32_t landmark = localizer.landmark_of()[i];
+    record.landmarks.push_back(landmark == kUnmatched ? kNoLandmark : map.landmarks[static_cast<std::size_t>(landmark)].id);
+  }
+  record.hidden.clear();
+  record.refuted.clear();
 }
 
 void Tracker::Impl::fill_keyframe(KeyframeRecord& record, const MapSnapshot& map) {
-  fill_features(record);
+  fill_features(record, map);
   record.purpose = RecordPurpose::Keyframe;
   record.id = ++last_keyframe;
   record.T_map_camera = localizer.solution().T_map_camera;
   record.covariance = localizer.solution().covariance;
-  record.landmarks.resize(frame.size());
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    record.landmarks[i] = localizer.landmark_of()[i] == kUnmatched
-                              ? kNoLandmark
-                              : map.landmarks[static_cast<std::size_t>(localizer.landmark_of()[i])].id;
+  if (mask) {
+    judge_visibility(map, *mask, record.T_map_camera, record);
   }
   frames_since_keyframe = 0;
   reference_inliers = 0;
@@ -313,31 +384,46 @@ void Tracker::Impl::find_camera(const MapSnapshot& map) {
   state = was_lost ? TrackingState::Relocalizing : TrackingState::Lost;
 }
 
-PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map, KeyframeRecord* candidate) {
+PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map, const Detections* newest,
+                                  KeyframeRecord* candidate) {
   const TimeNs begin_ns = now_ns();
   timing = Timing{};
   // Before the first frame no time has passed: a loaded map is searched for as long as any other.
   const TimeNs elapsed_ns = stamp_utc_ns == 0 ? 0 : std::max<TimeNs>(0, rgbd.stamp_utc_ns - stamp_utc_ns);
   sequence = rgbd.sequence;
   stamp_utc_ns = rgbd.stamp_utc_ns;
-  extractor.extract(rgbd.gray, frame.features());
-  frame.place(camera, rgbd.depth_m);
+  if (mask) {
+    mask->begin(rgbd, motion.last_pose() ? motion.predict(stamp_utc_ns) : T_map_start, newest);
+  }
+  const TimeNs masked_ns = now_ns();
+  timing.mask_ns = masked_ns - begin_ns;
+  extract(rgbd);
   const TimeNs extracted_ns = now_ns();
-  timing.extract_ns = extracted_ns - begin_ns;
+  timing.extract_ns = extracted_ns - masked_ns;
   localizer.reset(frame);
   ++frames_since_keyframe;
   starts_map = false;
+  wary = false;
   T_map_odom = map.T_map_odom;
 
   if (!has_map && map.version > 0 && !map.keyframes.empty()) {
     adopt(map);
   }
   if (has_map) {
+    const bool was_tracking = state == TrackingState::Tracking;
     find_camera(map);
+    if (was_tracking && state == TrackingState::Lost && mask && mask->summary().masked_share > kMuchMasked) {
+      wary = true;
+      extract_warily(rgbd);
+      state = track_by_motion(map) ? TrackingState::Tracking : TrackingState::Lost;
+    }
   }
   if (candidate != nullptr && wants_map(map, elapsed_ns)) {
     initialize(map);
   }
+  const TimeNs found_ns = now_ns();
+  leave_movers_out(map);
+  timing.mask_ns += now_ns() - found_ns;
   PoseEstimate estimate = describe(map, candidate);
   estimate.sequence = rgbd.sequence;
   estimate.capture_ns = rgbd.capture_ns;
@@ -347,7 +433,7 @@ PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map,
   }
   estimate.track_ns = now_ns() - begin_ns;
   timing.solve_ns = localizer.take_solve_ns();
-  timing.match_ns = estimate.track_ns - timing.extract_ns - timing.solve_ns;
+  timing.match_ns = estimate.track_ns - timing.mask_ns - timing.extract_ns - timing.solve_ns;
   return estimate;
 }
 
@@ -359,6 +445,12 @@ PoseEstimate Tracker::Impl::describe(const MapSnapshot& map, KeyframeRecord* can
   estimate.matches = localizer.matches();
   estimate.map_id = map_id;
   estimate.map_version = map.version;
+  if (mask) {
+    estimate.masked_share = mask->summary().masked_share;
+    estimate.people = mask->summary().people;
+    estimate.other_movers = mask->summary().others;
+    estimate.detection_age_ns = mask->summary().detection_age_ns;
+  }
   if (state == TrackingState::Tracking) {
     estimate.T_map_odom = T_map_odom;
     estimate.T_odom_camera = T_map_odom.inverse() * localizer.solution().T_map_camera;
@@ -374,21 +466,29 @@ PoseEstimate Tracker::Impl::describe(const MapSnapshot& map, KeyframeRecord* can
     estimate.asks_where = true;
     candidate->purpose = RecordPurpose::Relocalization;
     candidate->id = kNoKeyframe;
-    candidate->landmarks.assign(frame.size(), kNoLandmark);
-    fill_features(*candidate);
+    fill_features(*candidate, map);
+    candidate->landmarks.assign(candidate->features.keypoints.size(), kNoLandmark);
     asked = true;
     asked_sequence = sequence;
   }
   return estimate;
 }
 
-Tracker::Tracker(const TrackerConfig& config, const MapperConfig& mapper, MapMode mode, const CameraIntrinsics& camera,
-                 const Se3& T_map_camera_start)
-    : impl_(std::make_unique<Impl>(config, mapper, mode, camera, T_map_camera_start)) {}
+Tracker::Tracker(const TrackerConfig& config, const MapperConfig& mapper, const DynamicConfig& dynamic, MapMode mode,
+                 const CameraIntrinsics& camera, const Se3& T_map_camera_start)
+    : impl_(std::make_unique<Impl>(config, mapper, dynamic, mode, camera, T_map_camera_start)) {}
 Tracker::~Tracker() = default;
 
-PoseEstimate Tracker::track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) {
-  return impl_->track(frame, map, candidate);
+PoseEstimate Tracker::track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest, KeyframeRecord* candidate) {
+  return impl_->track(frame, map, newest, candidate);
+}
+
+const DynamicMask* Tracker::last_mask() const {
+  return impl_->mask ? &*impl_->mask : nullptr;
+}
+
+const FeatureFrame& Tracker::last_features() const {
+  return impl_->frame;
 }
 
 const Tracker::Timing& Tracker::last_timing() const {

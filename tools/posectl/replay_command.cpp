@@ -186,7 +186,8 @@ int run_replay(const ReplayOptions& options, const Console& console) {
     return report_error(console.err, config.error());
   }
   config->map.mode = options.localization_only ? MapMode::Localization : MapMode::Mapping;
-  config->detector.enabled = config->detector.enabled && (options.publish || !options.detections.empty());
+  const bool asks_for_people = options.publish || !options.detections.empty() || config->dynamic.mode != DynamicMode::Off;
+  config->detector.enabled = config->detector.enabled && asks_for_people;
   if (const Status status = check_before_run(options, *config); !status) {
     return report_error(console.err, status.error());
   }
@@ -248,6 +249,12 @@ void add_source_options(CLI::App& command, ReplaySource& source) {
                   fmt::format("Synthetic: length [s]; {} where nothing says otherwise", kDefaultSyntheticDuration_s))
       ->check(CLI::PositiveNumber)
       ->excludes(sequence);
+  const std::map<std::string, DynamicMode> dynamics{
+      {"off", DynamicMode::Off}, {"boxes", DynamicMode::Boxes}, {"full", DynamicMode::Full}};
+  command
+      .add_option("--dynamic", source.dynamic,
+                  "What moves is left out: off (everything is static), boxes (all of detected people's boxes), full (the default)")
+      ->transform(CLI::CheckedTransformer(dynamics));
   command.add_flag("--no-noise", source.no_noise, "Synthetic: a sensor without noise")->excludes(sequence);
 }
 

@@ -67,6 +67,7 @@ Result<Config> make_replay_config(const ReplaySource& source) {
     return config;
   }
   apply_source(source, config->source);
+  config->dynamic.mode = source.dynamic.value_or(config->dynamic.mode);
   if (!source.camera.empty()) {
     const Result<CameraIntrinsics> camera = load_camera(source.camera);
     if (!camera) {

@@ -24,6 +24,7 @@ struct ReplaySource {
   std::optional<int> people;
   std::optional<double> duration_s;
   bool no_noise = false;
+  std::optional<DynamicMode> dynamic;
 };
 
 /// How long the synthetic source runs where neither the command line nor a configuration file says.

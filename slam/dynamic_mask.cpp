@@ -1,0 +1,367 @@
+#include "slam/dynamic_mask.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slam/surface.h"
+
+namespace posed {
+
+namespace {
+
+constexpr double kReachPeriod_s = 0.034;     // in which a mover's edge moves by at most a cell more
+constexpr int kMostReach = 5;                // [cells] a frame
+constexpr float kSameMover = 0.3F;           // of the smaller of two areas: they overlap by more, so they are one
+constexpr float kStrengthCap = 3.0F;         // of a person whom the detector always sees
+constexpr float kMissedLoss = 0.1F;          // of strength, with each look of the detector that does not see them
+constexpr float kSureStrength = 1.0F;        // two or three looks; less does not stand against all appearance
+constexpr float kAllStatic = 0.7F;           // share of a person's cells that were there before, which makes them doubtful
+constexpr float kAnyMoved = 0.05F;           // share of cells that have moved, which confirms a mover
+constexpr std::size_t kLeastCells = 6;       // of a mover
+constexpr int kMovedAround = 3;              // moved or masked neighbours without which a moved cell is taken for noise
+constexpr int kMovedReach = 10;              // [cells] from what has moved, over connected surface that may have
+constexpr TimeNs kRecallNs = kNsPerSecond;   // a frame further back is not carried from
+
+}  // namespace
+
+DynamicMask::DynamicMask(const DynamicConfig& config, const PinholeCamera& camera)
+    : config_(config),
+      image_width_(camera.intrinsics().width),
+      camera_(camera),
+      free_space_(camera),
+      segmentation_(camera.intrinsics().width, camera.intrinsics().height),
+      carrier_(camera),
+      history_(kHistory, Entry(camera.intrinsics().width, camera.intrinsics().height)) {
+  const std::size_t cells = history_.front().labels.size();
+  evidence_.assign(cells, CellEvidence::Unknown);
+  carried_.assign(cells, 0);
+  carried_2_.assign(cells, 0);
+  cells_.reserve(cells);
+  masked_.assign(cells, 0);
+  interior_.assign(cells, 0);
+}
+
+std::size_t DynamicMask::find(std::uint64_t sequence) const {
+  for (std::size_t back = 0; back < std::min(taken_, kHistory); ++back) {
+    if (history_[(taken_ - 1 - back) % kHistory].sequence == sequence) {
+      return back;
+    }
+  }
+  return kHistory;
+}
+
+void DynamicMask::begin(const RgbdFrame& frame, const Se3& T_odom_camera, const Detections* newest_detections) {
+  const bool first = taken_ == 0;
+  ++taken_;
+  Entry& now = newest();
+  now.depth.assign(frame.depth_m);
+  now.T_odom_camera = T_odom_camera;
+  now.sequence = frame.sequence;
+  now.stamp_ns = frame.stamp_utc_ns;
+  std::fill(now.labels.begin(), now.labels.end(), std::uint8_t{0});
+  if (!first) {
+    const Entry& before = history_[(taken_ - 2) % kHistory];
+    const double elapsed_s = to_seconds(now.stamp_ns - before.stamp_ns);
+    const int reach = std::clamp(1 + static_cast<int>(std::lround(elapsed_s / kReachPeriod_s)), 1, kMostReach);
+    carrier_.carry(before.depth, before.labels, T_odom_camera.inverse() * before.T_odom_camera, reach, now.depth, now.labels);
+  }
+  summary_ = Summary{};
+  const bool has_news = newest_detections != nullptr && newest_detections->image_width > 0;
+  if (has_news && now.stamp_ns - newest_detections->stamp_utc_ns <= from_seconds(config_.max_detection_age_s)) {
+    summary_.detection_age_ns = now.stamp_ns - newest_detections->stamp_utc_ns;
+    if (config_.mode == DynamicMode::Boxes) {
+      mask_boxes(*newest_detections);
+    } else if (newest_detections->sequence + 1 != last_detection_) {
+      last_detection_ = newest_detections->sequence + 1;
+      take_in(*newest_detections);
+    }
+  }
+  complete();
+}
+
+/// The source paper's way: all of the box.
+void DynamicMask::mask_boxes(const Detections& detections) {
+  Entry& now = newest();
+  std::fill(now.labels.begin(), now.labels.end(), std::uint8_t{0});
+  movers_[0] = Mover{true, true, kStrengthCap, now.stamp_ns, true};
+  for (const Detection& d : detections.found()) {
+    for (int row = 0; row < now.depth.rows(); ++row) {
+      for (int column = 0; column < now.depth.columns(); ++column) {
+        const float x = (static_cast<float>(column) + 0.5F) * DepthGrid::kCell;
+        const float y = (static_cast<float>(row) + 0.5F) * DepthGrid::kCell;
+        if (x >= d.box.x_min && x <= d.box.x_max && y >= d.box.y_min && y <= d.box.y_max) {
+          now.labels[now.depth.cell(column, row)] = kPersonCore | 1;
+        }
+      }
+    }
+  }
+}
+
+void DynamicMask::take_in(const Detections& detections) {
+  const std::size_t back = find(detections.sequence);
+  if (back == kHistory || newest().stamp_ns - detections.stamp_utc_ns > kRecallNs) {
+    return;
+  }
+  for (Mover& mover : movers_) {
+    if (mover.person) {
+      mover.strength -= kMissedLoss;  // whom the detector sees gets it back
+    }
+  }
+  const Entry& then = history_[(taken_ - 1 - back) % kHistory];
+  for (const Detection& detection : detections.found()) {
+    segmentation_.segment(then.depth, detection.box, cells_);
+    if (cells_.size() < kLeastCells) {
+      continue;
+    }
+    std::fill(carried_.begin(), carried_.end(), std::uint8_t{0});
+    for (const std::uint32_t cell : cells_) {
+      carried_[cell] = kPersonCore | 1;
+    }
+    carry_to_present(back);
+    meet(detection.score);
+  }
+}
+
+/// Moves `carried_` from an earlier frame through those after it.
+void DynamicMask::carry_to_present(std::size_t frames_back) {
+  for (std::size_t back = frames_back; back > 0; --back) {
+    const Entry& from = history_[(taken_ - 1 - back) % kHistory];
+    const Entry& to = history_[(taken_ - back) % kHistory];
+    carrier_.carry(from.depth, carried_, to.T_odom_camera.inverse() * from.T_odom_camera, 1, to.depth, carried_2_);
+    std::swap(carried_, carried_2_);
+  }
+}
+
+/// Joins `carried_` with the mover it overlaps most, or makes it one.
+void DynamicMask::meet(float score) {
+  Entry& now = newest();
+  std::array<std::size_t, kMostMovers + 1> area{};
+  std::array<std::size_t, kMostMovers + 1> common{};
+  std::size_t own = 0;
+  for (std::size_t cell = 0; cell < carried_.size(); ++cell) {
+    ++area[mover_of(now.labels[cell])];
+    if (carried_[cell] != 0) {
+      ++own;
+      ++common[mover_of(now.labels[cell])];
+    }
+  }
+  if (own < kLeastCells) {
+    return;
+  }
+  const auto best = static_cast<std::size_t>(std::max_element(common.begin() + 1, common.end()) - common.begin());
+  const bool known = static_cast<float>(common[best]) >= kSameMover * static_cast<float>(std::min(own, area[best])) && area[best] > 0;
+  const auto id = known ? static_cast<std::uint8_t>(best) : new_mover();
+  if (id == 0) {
+    return;  // more movers than anyone can tell apart
+  }
+  Mover& mover = movers_[id - 1];
+  mover.person = true;
+  mover.strength = std::min(kStrengthCap, mover.strength + score + kMissedLoss);
+  mover.confirmed_ns = now.stamp_ns;
+  for (std::size_t cell = 0; cell < carried_.size(); ++cell) {
+    if (carried_[cell] != 0 && (now.labels[cell] == 0 || mover_of(now.labels[cell]) == id)) {
+      now.labels[cell] = static_cast<std::uint8_t>(id | (carried_[cell] & kPersonCore));
+    }
+  }
+}
+
+std::uint8_t DynamicMask::new_mover() {
+  const auto free = std::find_if(movers_.begin(), movers_.end(), [](const Mover& m) { return !m.alive; });
+  if (free == movers_.end()) {
+    return 0;
+  }
+  *free = Mover{};
+  free->alive = true;
+  free->confirmed_ns = newest().stamp_ns;
+  return static_cast<std::uint8_t>(free - movers_.begin() + 1);
+}
+
+bool DynamicMask::settle(const Se3& T_odom_camera) {
+  Entry& now = newest();
+  now.T_odom_camera = T_odom_camera;
+  if (config_.mode != DynamicMode::Full) {
+    return false;
+  }
+  free_space_.judge(now.depth, T_odom_camera, now.stamp_ns, evidence_);
+  prune(now);
+  const bool more = add_moved(now);
+  fill_holes(now.depth, now.labels);
+  forget_dead(now);
+  complete();
+  free_space_.remember(now.depth, masked_, T_odom_camera, now.stamp_ns);
+  return more;
+}
+
+void DynamicMask::settle_lost() {
+  free_space_.forget();
+  if (config_.mode == DynamicMode::Full) {
+    forget_dead(newest());
+    complete();
+  }
+}
+
+/// What was there before is no mover's, unless a detector says so.
+void DynamicMask::prune(Entry& now) {
+  struct Count {
+    std::size_t cells = 0;
+    std::size_t moved = 0;
+    std::size_t was_there = 0;
+  };
+  std::array<Count, kMostMovers + 1> counts{};
+  for (std::size_t cell = 0; cell < now.labels.size(); ++cell) {
+    std::uint8_t& label = now.labels[cell];
+    if (label == 0) {
+      continue;
+    }
+    Count& count = counts[mover_of(label)];
+    ++count.cells;
+    count.moved += evidence_[cell] == CellEvidence::Moved ? 1 : 0;
+    if (evidence_[cell] == CellEvidence::Static) {
+      ++count.was_there;
+      if (!movers_[mover_of(label) - 1U].person || (label & kPersonCore) == 0) {
+        label = 0;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < movers_.size(); ++i) {
+    Mover& mover = movers_[i];
+    const Count& count = counts[i + 1];
+    const auto share = [&](std::size_t part) { return static_cast<float>(part) > static_cast<float>(count.cells) * kAnyMoved; };
+    if (mover.alive && count.moved >= kLeastCells && share(count.moved)) {
+      mover.confirmed_ns = now.stamp_ns;
+      mover.masked = true;
+    } else if (mover.person) {
+      const bool doubtful = static_cast<float>(count.was_there) > kAllStatic * static_cast<float>(count.cells);
+      mover.masked = !doubtful || mover.strength >= kSureStrength;
+    }
+  }
+}
+
+/// Cells that have moved and belong to nobody: they go to the mover they touch, or are a new one.
+bool DynamicMask::add_moved(Entry& now) {
+  const auto is_moved = [&](std::size_t cell) {
+    if (now.labels[cell] != 0 || evidence_[cell] != CellEvidence::Moved) {
+      return false;
+    }
+    int around = 0;
+    now.depth.for_each_around(cell, [&](std::size_t c) {
+      around += evidence_[c] == CellEvidence::Moved || now.labels[c] != 0 ? 1 : 0;
+    });
+    return around >= kMovedAround;
+  };
+  bool added = false;
+  std::fill(carried_.begin(), carried_.end(), std::uint8_t{0});  // here: the distance from what has moved, plus 1
+  for (std::size_t seed = 0; seed < now.labels.size(); ++seed) {
+    if (carried_[seed] != 0 || !is_moved(seed)) {
+      continue;
+    }
+    cells_.assign(1, static_cast<std::uint32_t>(seed));
+    carried_[seed] = 1;
+    std::size_t moved = 1;
+    std::uint8_t met = 0;
+    for (std::size_t next = 0; next < cells_.size(); ++next) {
+      const std::size_t from = cells_[next];
+      now.depth.for_each_beside(from, [&](std::size_t to) {
+        if (!is_one_surface(now.depth[from], now.depth[to])) {
+          return;
+        }
+        if (now.labels[to] != 0) {
+          met = met == 0 ? mover_of(now.labels[to]) : met;
+          return;
+        }
+        if (carried_[to] != 0 || evidence_[to] == CellEvidence::Static) {
+          return;
+        }
+        const bool seeds = is_moved(to);
+        if (seeds || carried_[from] < kMovedReach) {
+          carried_[to] = seeds ? std::uint8_t{1} : static_cast<std::uint8_t>(carried_[from] + 1);
+          moved += seeds ? 1 : 0;
+          cells_.push_back(static_cast<std::uint32_t>(to));
+        }
+      });
+    }
+    if (moved < kLeastCells && met == 0) {
+      continue;
+    }
+    const std::uint8_t id = met != 0 ? met : new_mover();
+    if (id == 0) {
+      continue;
+    }
+    movers_[id - 1U].confirmed_ns = now.stamp_ns;
+    for (const std::uint32_t cell : cells_) {
+      now.labels[cell] = id;
+    }
+    added = true;
+  }
+  return added;
+}
+
+void DynamicMask::forget_dead(const Entry& now) {
+  std::array<std::size_t, kMostMovers + 1> area{};
+  for (const std::uint8_t label : now.labels) {
+    ++area[mover_of(label)];
+  }
+  bool any_died = false;
+  for (std::size_t i = 0; i < movers_.size(); ++i) {
+    Mover& mover = movers_[i];
+    const bool tired = now.stamp_ns - mover.confirmed_ns > from_seconds(config_.memory_s);
+    if (mover.alive && (tired || area[i + 1] < kLeastCells || (mover.person && mover.strength < 0 && !mover.masked))) {
+      mover = Mover{};
+      any_died = true;
+    }
+  }
+  if (any_died) {
+    for (std::uint8_t& label : newest().labels) {
+      if (label != 0 && !movers_[mover_of(label) - 1U].alive) {
+        label = 0;
+      }
+    }
+  }
+}
+
+/// What the labels mean for features, and the summary.
+void DynamicMask::complete() {
+  const Entry& now = newest();
+  std::size_t count = 0;
+  for (std::size_t cell = 0; cell < masked_.size(); ++cell) {
+    const std::uint8_t label = now.labels[cell];
+    masked_[cell] = label != 0 && movers_[mover_of(label) - 1U].masked ? 1 : 0;
+    count += masked_[cell];
+  }
+  for (std::size_t cell = 0; cell < masked_.size(); ++cell) {
+    std::uint8_t inside = masked_[cell];
+    if (inside != 0) {
+      now.depth.for_each_around(cell, [&](std::size_t c) { inside = static_cast<std::uint8_t>(inside & masked_[c]); });
+    }
+    interior_[cell] = inside;
+  }
+  summary_.masked_share = static_cast<float>(count) / static_cast<float>(masked_.size());
+  summary_.people = 0;
+  summary_.others = 0;
+  for (const Mover& mover : movers_) {
+    if (mover.alive && mover.masked) {
+      ++(mover.person ? summary_.people : summary_.others);
+    }
+  }
+}
+
+bool DynamicMask::is_mover(float x, float y, float depth_m) const {
+  const DepthGrid& depth = this->depth();
+  const int column = std::clamp(static_cast<int>((x + 0.5F) / DepthGrid::kCell), 0, depth.columns() - 1);
+  const int row = std::clamp(static_cast<int>((y + 0.5F) / DepthGrid::kCell), 0, depth.rows() - 1);
+  const std::size_t cell = depth.cell(column, row);
+  if (interior_[cell] != 0) {
+    return true;
+  }
+  if (masked_[cell] != 0) {
+    // Beside a mover's edge the background shows in the same cell.
+    return depth_m <= 0 || depth[cell] <= 0 || depth_m < depth[cell] + 2 * depth_tolerance_m(depth[cell]);
+  }
+  bool mover = false;
+  depth.for_each_around(cell, [&](std::size_t c) {
+    mover = mover || (masked_[c] != 0 && (depth_m <= 0 || (depth[c] > 0 && std::abs(depth_m - depth[c]) < 0.5F * depth_tolerance_m(depth[c]))));
+  });
+  return mover;
+}
+
+}  // namespace posed

@@ -1,0 +1,79 @@
+#include "slam/mover_labels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slam/free_space.h"
+#include "slam/surface.h"
+
+namespace posed {
+
+MoverCarrier::MoverCarrier(const PinholeCamera& camera) : camera_(camera) {
+  const DepthGrid grid(camera.intrinsics().width, camera.intrinsics().height);
+  front_.reserve(grid.size());
+  next_front_.reserve(grid.size());
+}
+
+void MoverCarrier::carry(const DepthGrid& from, std::span<const std::uint8_t> labels_from, const Se3& T_to_from, int reach,
+                         const DepthGrid& to, std::span<std::uint8_t> labels_to) {
+  std::fill(labels_to.begin(), labels_to.end(), std::uint8_t{0});
+  const Eigen::Matrix3f R = T_to_from.rotation_matrix().cast<float>();
+  const Eigen::Vector3f t = T_to_from.translation().cast<float>();
+  for (std::size_t cell = 0; cell < from.size(); ++cell) {
+    if (labels_from[cell] == 0 || from[cell] <= 0) {
+      continue;
+    }
+    const Eigen::Vector3f p = R * camera_.point(cell, from[cell]) + t;
+    const int there = camera_.cell_of(p);
+    if (there == GridCamera::kOutside) {
+      continue;
+    }
+    const auto c = static_cast<std::size_t>(there);
+    if (to[c] > 0 && std::abs(to[c] - p.z()) < depth_tolerance_m(p.z())) {
+      labels_to[c] = std::max(labels_to[c], labels_from[cell]);  // of two that meet the same one wins, whatever the order
+    }
+  }
+  grow(to, reach, labels_to);
+  fill_holes(to, labels_to);
+}
+
+void MoverCarrier::grow(const DepthGrid& to, int reach, std::span<std::uint8_t> labels_to) {
+  front_.clear();
+  for (std::size_t cell = 0; cell < labels_to.size(); ++cell) {
+    if (labels_to[cell] != 0) {
+      front_.push_back(static_cast<std::uint32_t>(cell));
+    }
+  }
+  for (int step = 0; step < reach; ++step) {
+    next_front_.clear();
+    for (const std::uint32_t cell : front_) {
+      to.for_each_beside(cell, [&](std::size_t beside) {
+        if (labels_to[beside] == 0 && is_one_surface(to[cell], to[beside])) {
+          labels_to[beside] = mover_of(labels_to[cell]);
+          next_front_.push_back(static_cast<std::uint32_t>(beside));
+        }
+      });
+    }
+    std::swap(front_, next_front_);
+  }
+}
+
+void fill_holes(const DepthGrid& depth, std::span<std::uint8_t> labels) {
+  constexpr int kLeastAround = 4;
+  for (std::size_t cell = 0; cell < labels.size(); ++cell) {
+    if (labels[cell] != 0 || depth[cell] > 0) {
+      continue;
+    }
+    int around = 0;
+    std::uint8_t label = 0;
+    depth.for_each_around(cell, [&](std::size_t c) {
+      if (labels[c] != 0) {
+        ++around;
+        label = std::max(label, labels[c]);
+      }
+    });
+    labels[cell] = around >= kLeastAround ? label : std::uint8_t{0};
+  }
+}
+
+}  // namespace posed

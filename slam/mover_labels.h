@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/se3.h"
+#include "slam/depth_grid.h"
+
+namespace posed {
+
+/// One entry a cell: 0, or a mover's number from 1 on, with a flag where a detection said that the cell is a person's.
+constexpr std::size_t kMostMovers = 31;
+constexpr std::uint8_t kMoverMask = 0x3F;
+constexpr std::uint8_t kPersonCore = 0x80;
+
+constexpr std::uint8_t mover_of(std::uint8_t label) {
+  return label & kMoverMask;
+}
+
+/// Moves labels from one frame to a later one. Allocates at construction only. Thread-bound.
+class MoverCarrier {
+ public:
+  explicit MoverCarrier(const PinholeCamera& camera);
+
+  /// Replaces `labels_to`. A labelled cell's surface is expected where the camera's motion puts it; the labels found there grow
+  /// over connected surface by `reach` cells, for the mover's own motion, and fill holes in the depth.
+  void carry(const DepthGrid& from, std::span<const std::uint8_t> labels_from, const Se3& T_to_from, int reach, const DepthGrid& to,
+             std::span<std::uint8_t> labels_to);
+
+ private:
+  void grow(const DepthGrid& to, int reach, std::span<std::uint8_t> labels_to);
+
+  GridCamera camera_;
+  std::vector<std::uint32_t> front_;
+  std::vector<std::uint32_t> next_front_;
+};
+
+/// Labels cells without depth that lie among those of one mover: hair and black cloth swallow the sensor's light.
+void fill_holes(const DepthGrid& depth, std::span<std::uint8_t> labels);
+
+}  // namespace posed

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/detections.h"
+#include "slam/depth_grid.h"
+
+namespace posed {
+
+/// Cuts the person out of a detected box by depth, so that the background beside them is kept: the depths in the box are
+/// clustered (K-means, each cell weighted by how near it is to the box's middle), the cluster that is the person is chosen, and it
+/// grows over connected surface a little beyond the box, because detectors cut off elbows. Allocates at construction only.
+/// Thread-bound.
+class PersonSegmentation {
+ public:
+  PersonSegmentation(int image_width, int image_height);
+
+  /// Replaces `cells` by the person's, ascending. Cells without depth are left out; none where the box shows no depth.
+  void segment(const DepthGrid& depth, const BoundingBox& box, std::vector<std::uint32_t>& cells);
+
+ private:
+  struct Sample {
+    std::uint32_t cell;
+    float depth_m;
+    float weight;
+  };
+  struct Cluster {
+    float depth_m = 0;
+    float weight = 0;
+    float deviation_m = 0;
+  };
+  struct Range {
+    int x0, y0, x1, y1;  // [cells] the last ones included
+  };
+
+  Range cells_of(const BoundingBox& box, float margin) const;
+  void collect(const DepthGrid& depth, const Range& range);
+  Cluster person_cluster() const;
+  void grow(const DepthGrid& depth, const Range& range, const Cluster& person, std::vector<std::uint32_t>& cells);
+
+  int columns_;
+  int rows_;
+  std::vector<Sample> samples_;
+  std::vector<std::uint8_t> seen_;
+  std::vector<std::uint32_t> queue_;
+};
+
+}  // namespace posed
