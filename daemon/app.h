@@ -12,6 +12,7 @@
 #include "core/result.h"
 #include "core/se3.h"
 #include "daemon/health.h"
+#include "daemon/tracked_view.h"
 #include "drivers/rgbd_source.h"
 
 namespace posed {
@@ -33,6 +34,8 @@ struct AppOptions {
   std::function<void(const PoseEstimate&)> on_estimate;
   /// Called for every frame the detector has looked at, in order, likewise.
   std::function<void(const Detections&)> on_detections;
+  /// Called for every frame the tracker processed, in order, on the tracking thread, whose time it takes: for lockstep.
+  std::function<void(const TrackedView&)> on_tracked;
   /// Called when the source skips a bad frame or fails, on the capture thread, with the reason.
   std::function<void(const Error&)> on_source_error;
   std::optional<MapFiles> map_files;  ///< instead of those of the configuration

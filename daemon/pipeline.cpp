@@ -81,7 +81,7 @@ class Pipeline final : public App {
         links_(config),
         capture_(*parts_.source, pool_, std::move(options.on_source_error)),
         tracking_(*parts_.tracker, {links_.snapshots, links_.newest_detections, links_.keyframes, links_.estimates}, clock,
-                  is_lockstep() ? FullQueue::Waits : FullQueue::DropsOldest),
+                  is_lockstep() ? FullQueue::Waits : FullQueue::DropsOldest, std::move(options.on_tracked)),
         saver_(*parts_.mapper, options.map_files.value_or(map_files(config.map)),
                is_lockstep() ? 0 : from_seconds(config.map.save_period_s), clock),
         mapping_(*parts_.mapper, links_.keyframes, links_.snapshots, saver_, clock),

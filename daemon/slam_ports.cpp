@@ -18,6 +18,8 @@ class SlamTracker final : public FrameTracker {
                      KeyframeRecord* candidate) override {
     return tracker_.track(frame, map, newest, candidate);
   }
+  const DynamicMask* last_mask() const override { return tracker_.last_mask(); }
+  const Features* last_features() const override { return &tracker_.last_features().features(); }
 
  private:
   Tracker tracker_;

@@ -9,6 +9,8 @@
 #include "core/estimates.h"
 #include "core/result.h"
 #include "core/rgbd_frame.h"
+#include "slam/dynamic_mask.h"
+#include "slam/features.h"
 #include "slam/keyframe_record.h"
 #include "slam/map_snapshot.h"
 #include "slam/mapper.h"
@@ -22,6 +24,11 @@ class FrameTracker {
   virtual ~FrameTracker() = default;
   virtual PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest,
                              KeyframeRecord* candidate) = 0;
+
+  /// What was masked in the last frame; null where nothing ever is.
+  virtual const DynamicMask* last_mask() const { return nullptr; }
+  /// The features of the last frame that were kept; null where there is nothing to tell.
+  virtual const Features* last_features() const { return nullptr; }
 };
 
 /// The mapper as the pipeline sees it (slam/mapper.h). Thread-bound.

@@ -1,11 +1,13 @@
 #include "daemon/tracking_stage.h"
 
 #include <optional>
+#include <utility>
 
 namespace posed {
 
-TrackingStage::TrackingStage(FrameTracker& tracker, Links links, const Clock& clock, FullQueue full_queue)
-    : tracker_(tracker), links_(links), clock_(clock), full_queue_(full_queue) {}
+TrackingStage::TrackingStage(FrameTracker& tracker, Links links, const Clock& clock, FullQueue full_queue,
+                             std::function<void(const TrackedView&)> on_tracked)
+    : tracker_(tracker), links_(links), clock_(clock), full_queue_(full_queue), on_tracked_(std::move(on_tracked)) {}
 
 void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
   links_.snapshots.refresh();
@@ -26,6 +28,9 @@ void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
     keyframes_.add(estimate.keyframe ? 1 : 0);
     links_.keyframes.ring.commit();
     links_.keyframes.notify_arrived();
+  }
+  if (on_tracked_) {
+    on_tracked_({frame, estimate, tracker_.last_mask(), tracker_.last_features()});
   }
   hand_on(estimate, stop);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <stop_token>
 
 #include "core/clock.h"
@@ -10,6 +11,7 @@
 #include "daemon/health.h"
 #include "daemon/slam_ports.h"
 #include "daemon/stage_link.h"
+#include "daemon/tracked_view.h"
 #include "slam/map_snapshot.h"
 
 namespace posed {
@@ -32,8 +34,9 @@ class TrackingStage {
     EstimateLink& estimates;
   };
 
-  /// Everything passed in must outlive the stage.
-  TrackingStage(FrameTracker& tracker, Links links, const Clock& clock, FullQueue full_queue);
+  /// Everything passed in must outlive the stage. `on_tracked`: called after each frame, for tools; it takes the thread's time.
+  TrackingStage(FrameTracker& tracker, Links links, const Clock& clock, FullQueue full_queue,
+                std::function<void(const TrackedView&)> on_tracked = {});
 
   void track(const RgbdFrame& frame, const std::stop_token& stop);
 
@@ -52,6 +55,7 @@ class TrackingStage {
   Links links_;
   const Clock& clock_;
   FullQueue full_queue_;
+  std::function<void(const TrackedView&)> on_tracked_;
 
   std::atomic<TrackingState> state_{TrackingState::Initializing};
   Counter tracked_;

@@ -12,14 +12,20 @@ namespace {
 constexpr double kReachPeriod_s = 0.034;     // in which a mover's edge moves by at most a cell more
 constexpr int kMostReach = 5;                // [cells] a frame
 constexpr float kSameMover = 0.3F;           // of the smaller of two areas: they overlap by more, so they are one
-constexpr float kStrengthCap = 3.0F;         // of a person whom the detector always sees
-constexpr float kMissedLoss = 0.1F;          // of strength, with each look of the detector that does not see them
-constexpr float kSureStrength = 1.0F;        // two or three looks; less does not stand against all appearance
+// A detector's looks add up to a person's strength as log-likelihoods do: a sure look gains, a miss loses, and boxes that come and
+// go on furniture stay below what it takes to stand against all appearance.
+constexpr float kStrengthCap = 3.0F;
+constexpr float kFoundGain = 0.5F;
+constexpr float kScoreGain = 3.0F;           // for each unit of score above...
+constexpr float kPlainScore = 0.4F;          // ...this
+constexpr float kMissedLoss = 0.3F;
+constexpr float kSureStrength = 1.2F;
 constexpr float kAllStatic = 0.7F;           // share of a person's cells that were there before, which makes them doubtful
 constexpr float kAnyMoved = 0.05F;           // share of cells that have moved, which confirms a mover
 constexpr std::size_t kLeastCells = 6;       // of a mover
 constexpr int kMovedAround = 3;              // moved or masked neighbours without which a moved cell is taken for noise
 constexpr int kMovedReach = 10;              // [cells] from what has moved, over connected surface that may have
+constexpr int kStillStep = 2;                // [cells] that a cell counts for which was there a moment ago
 constexpr TimeNs kRecallNs = kNsPerSecond;   // a frame further back is not carried from
 
 }  // namespace
@@ -156,7 +162,7 @@ void DynamicMask::meet(float score) {
   }
   Mover& mover = movers_[id - 1];
   mover.person = true;
-  mover.strength = std::min(kStrengthCap, mover.strength + score + kMissedLoss);
+  mover.strength = std::min(kStrengthCap, mover.strength + kMissedLoss + kFoundGain + kScoreGain * (score - kPlainScore));
   mover.confirmed_ns = now.stamp_ns;
   for (std::size_t cell = 0; cell < carried_.size(); ++cell) {
     if (carried_[cell] != 0 && (now.labels[cell] == 0 || mover_of(now.labels[cell]) == id)) {
@@ -216,11 +222,10 @@ void DynamicMask::prune(Entry& now) {
     Count& count = counts[mover_of(label)];
     ++count.cells;
     count.moved += evidence_[cell] == CellEvidence::Moved ? 1 : 0;
-    if (evidence_[cell] == CellEvidence::Static) {
-      ++count.was_there;
-      if (!movers_[mover_of(label) - 1U].person || (label & kPersonCore) == 0) {
-        label = 0;
-      }
+    const bool was_there = evidence_[cell] == CellEvidence::Static || evidence_[cell] == CellEvidence::Still;
+    count.was_there += was_there ? 1 : 0;
+    if (was_there && (!movers_[mover_of(label) - 1U].person || (label & kPersonCore) == 0)) {
+      label = 0;
     }
   }
   for (std::size_t i = 0; i < movers_.size(); ++i) {
@@ -273,8 +278,9 @@ bool DynamicMask::add_moved(Entry& now) {
           return;
         }
         const bool seeds = is_moved(to);
-        if (seeds || carried_[from] < kMovedReach) {
-          carried_[to] = seeds ? std::uint8_t{1} : static_cast<std::uint8_t>(carried_[from] + 1);
+        const int step = evidence_[to] == CellEvidence::Still ? kStillStep : 1;
+        if (seeds || carried_[from] + step <= kMovedReach) {
+          carried_[to] = seeds ? std::uint8_t{1} : static_cast<std::uint8_t>(carried_[from] + step);
           moved += seeds ? 1 : 0;
           cells_.push_back(static_cast<std::uint32_t>(to));
         }

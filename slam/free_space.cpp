@@ -26,12 +26,13 @@ void FreeSpace::judge(const DepthGrid& now, const Se3& T_odom_camera, std::int64
   evidence.assign(now.size(), CellEvidence::Unknown);
   for (std::size_t i = 0; i < count_; ++i) {
     const Reference& reference = references_[i];
-    compare(now, reference, reference.T_odom_camera.inverse() * T_odom_camera, stamp_ns - reference.stamp_ns >= kStaticAge_ns,
+    const bool long_ago = stamp_ns - reference.stamp_ns >= kStaticAge_ns;
+    compare(now, reference, reference.T_odom_camera.inverse() * T_odom_camera, long_ago ? CellEvidence::Static : CellEvidence::Still,
             evidence);
   }
 }
 
-void FreeSpace::compare(const DepthGrid& now, const Reference& reference, const Se3& T_reference_now, bool may_be_static,
+void FreeSpace::compare(const DepthGrid& now, const Reference& reference, const Se3& T_reference_now, CellEvidence if_met,
                         std::vector<CellEvidence>& evidence) const {
   const Eigen::Matrix3f R = T_reference_now.rotation_matrix().cast<float>();
   const Eigen::Vector3f t = T_reference_now.translation().cast<float>();
@@ -62,8 +63,8 @@ void FreeSpace::compare(const DepthGrid& now, const Reference& reference, const 
     now.for_each_around(middle, look);
     if (free && valid >= kLeastAround) {
       evidence[cell] = CellEvidence::Moved;
-    } else if (met && may_be_static) {
-      evidence[cell] = CellEvidence::Static;
+    } else if (met) {
+      evidence[cell] = std::max(evidence[cell], if_met);
     }
   }
 }

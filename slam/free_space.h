@@ -15,6 +15,7 @@ namespace posed {
 /// What the past says of the surface that a cell shows.
 enum class CellEvidence : std::uint8_t {
   Unknown,  ///< nothing: it was hidden, out of view, or there is no depth
+  Still,    ///< it was there a moment ago
   Static,   ///< it was there a while ago
   Moved,    ///< an earlier frame saw through the place where it is now
 };
@@ -52,7 +53,7 @@ class FreeSpace {
   };
   static constexpr std::size_t kReferences = 8;
 
-  void compare(const DepthGrid& now, const Reference& reference, const Se3& T_reference_now, bool may_be_static,
+  void compare(const DepthGrid& now, const Reference& reference, const Se3& T_reference_now, CellEvidence if_met,
                std::vector<CellEvidence>& evidence) const;
 
   GridCamera camera_;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <ostream>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -19,6 +20,7 @@
 #include "tools/posectl/estimate_recorder.h"
 #include "tools/posectl/exit_code.h"
 #include "tools/posectl/interrupt.h"
+#include "tools/posectl/mask_report.h"
 #include "tools/posectl/progress.h"
 #include "tools/posectl/replay_config.h"
 #include "tools/posectl/replay_stats.h"
@@ -39,6 +41,7 @@ struct ReplayOptions {
   std::filesystem::path stats;
   std::filesystem::path groundtruth;
   std::filesystem::path detections;
+  MaskReport::Options masks;
   std::filesystem::path map_in;
   std::filesystem::path map_out;
   bool localization_only = false;
@@ -162,6 +165,16 @@ Status check_before_run(const ReplayOptions& options, const Config& config) {
   if (!options.groundtruth.empty() && config.source.kind != SourceKind::Synthetic) {
     return make_error(ErrorCode::InvalidArgument, "--groundtruth: only the synthetic world knows the true poses");
   }
+  const bool looks_at_masks = !options.masks.draw.empty() || !options.masks.truth.empty();
+  if (looks_at_masks && config.source.pacing != Pacing::Lockstep) {
+    return make_error(ErrorCode::InvalidArgument, "--draw and --mask-truth take the tracker's time, so they need --lockstep");
+  }
+  if (std::error_code failed; !options.masks.draw.empty()) {
+    std::filesystem::create_directories(options.masks.draw, failed);
+    if (failed) {
+      return make_error(ErrorCode::Io, fmt::format("{}: {}", options.masks.draw.string(), failed.message()));
+    }
+  }
   for (const std::filesystem::path& output : options.outputs()) {
     if (Status status = output.empty() ? Status{} : check_writable(output); !status) {
       return status;
@@ -200,6 +213,11 @@ int run_replay(const ReplayOptions& options, const Console& console) {
   app_options.on_estimate = [&recorder](const PoseEstimate& estimate) { recorder->record(estimate); };
   app_options.on_detections = [&detections](const Detections& found) { append_detections(found, detections); };
   app_options.on_source_error = [&source_errors](const Error& error) { source_errors.add(error); };
+  std::optional<MaskReport> masks;
+  if (!options.masks.draw.empty() || !options.masks.truth.empty()) {
+    masks.emplace(options.masks, *config);
+    app_options.on_tracked = [&masks](const TrackedView& view) { masks->add(view); };
+  }
   const Result<std::unique_ptr<App>> app = App::create(*config, app_options, SystemClock::instance());
   if (!app) {
     return report_error(console.err, app.error());
@@ -219,6 +237,12 @@ int run_replay(const ReplayOptions& options, const Console& console) {
     return report_error(console.err, written.error());
   }
   fmt::print(console.out, "{}", format_replay_summary(*stats));
+  if (masks) {
+    fmt::print(console.out, "{}", masks->summary());
+    if (!masks->status()) {
+      return report_error(console.err, masks->status().error());
+    }
+  }
   return exit_code_after(*stats, source_errors);
 }
 
@@ -274,6 +298,14 @@ void add_replay_command(CLI::App& parent, const Console& console, int& exit_code
                       "Synthetic: write the true pose of every processed frame (TUM format)");
   command->add_option("--detections", options->detections,
                       "Look for people, and write lines `stamp score x_min y_min x_max y_max` [s, pixels]");
+  CLI::Option* draw =
+      command->add_option("--draw", options->masks.draw, "Folder for pictures of frames: movers tinted, kept features dotted");
+  command->add_option("--draw-every", options->masks.draw_every, "Frames from one picture to the next; 15 unless given")
+      ->check(CLI::Range(1, 1'000'000))
+      ->needs(draw);
+  command->add_option("--mask-truth", options->masks.truth,
+                      "Folder of true masks, STAMP.png, to compare what was left out with")
+      ->check(CLI::ExistingDirectory);
   CLI::Option* map_in = command->add_option("--map-in", options->map_in, "Begin with this saved map");
   CLI::Option* map_out = command->add_option("--map-out", options->map_out, "Save the map at the end");
   command->add_flag("--localization-only", options->localization_only, "Use the map of --map-in without changing it")
