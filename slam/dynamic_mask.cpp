@@ -14,12 +14,13 @@ constexpr int kMostReach = 5;                // [cells] a frame
 constexpr float kSameMover = 0.3F;           // of the smaller of two areas: they overlap by more, so they are one
 // A detector's looks add up to a person's strength as log-likelihoods do: a sure look gains, a miss loses, and boxes that come and
 // go on furniture stay below what it takes to stand against all appearance.
-constexpr float kStrengthCap = 3.0F;
+constexpr float kStrengthCap = 4.0F;
 constexpr float kFoundGain = 0.5F;
 constexpr float kScoreGain = 3.0F;           // for each unit of score above...
 constexpr float kPlainScore = 0.4F;          // ...this
-constexpr float kMissedLoss = 0.3F;
-constexpr float kSureStrength = 1.2F;
+constexpr float kMissedLoss = 0.2F;
+constexpr float kSureStrength = 1.5F;
+constexpr double kSureMemory = 2.0;          // times the memory of others
 constexpr float kAllStatic = 0.7F;           // share of a person's cells that were there before, which makes them doubtful
 constexpr float kAnyMoved = 0.05F;           // share of cells that have moved, which confirms a mover
 constexpr std::size_t kLeastCells = 6;       // of a mover
@@ -89,7 +90,7 @@ void DynamicMask::begin(const RgbdFrame& frame, const Se3& T_odom_camera, const 
 void DynamicMask::mask_boxes(const Detections& detections) {
   Entry& now = newest();
   std::fill(now.labels.begin(), now.labels.end(), std::uint8_t{0});
-  movers_[0] = Mover{true, true, kStrengthCap, now.stamp_ns, true};
+  movers_[0] = Mover{true, true, kStrengthCap, true, now.stamp_ns, true};
   for (const Detection& d : detections.found()) {
     for (int row = 0; row < now.depth.rows(); ++row) {
       for (int column = 0; column < now.depth.columns(); ++column) {
@@ -163,8 +164,12 @@ void DynamicMask::meet(float score) {
   Mover& mover = movers_[id - 1];
   mover.person = true;
   mover.strength = std::min(kStrengthCap, mover.strength + kMissedLoss + kFoundGain + kScoreGain * (score - kPlainScore));
+  mover.sure = mover.sure || mover.strength >= kSureStrength;
   mover.confirmed_ns = now.stamp_ns;
   for (std::size_t cell = 0; cell < carried_.size(); ++cell) {
+    if (now.labels[cell] == (id | kPersonCore)) {
+      now.labels[cell] = id;  // the newest box says what is the person's core; an earlier one may have held more
+    }
     if (carried_[cell] != 0 && (now.labels[cell] == 0 || mover_of(now.labels[cell]) == id)) {
       now.labels[cell] = static_cast<std::uint8_t>(id | (carried_[cell] & kPersonCore));
     }
@@ -237,7 +242,7 @@ void DynamicMask::prune(Entry& now) {
       mover.masked = true;
     } else if (mover.person) {
       const bool doubtful = static_cast<float>(count.was_there) > kAllStatic * static_cast<float>(count.cells);
-      mover.masked = !doubtful || mover.strength >= kSureStrength;
+      mover.masked = !doubtful || mover.sure;
     }
   }
 }
@@ -310,8 +315,9 @@ void DynamicMask::forget_dead(const Entry& now) {
   bool any_died = false;
   for (std::size_t i = 0; i < movers_.size(); ++i) {
     Mover& mover = movers_[i];
-    const bool tired = now.stamp_ns - mover.confirmed_ns > from_seconds(config_.memory_s);
-    if (mover.alive && (tired || area[i + 1] < kLeastCells || (mover.person && mover.strength < 0 && !mover.masked))) {
+    const double memory_s = config_.memory_s * (mover.sure ? kSureMemory : 1.0);
+    const bool tired = now.stamp_ns - mover.confirmed_ns > from_seconds(memory_s);
+    if (mover.alive && (tired || area[i + 1] < kLeastCells || (mover.strength < 0 && !mover.masked))) {
       mover = Mover{};
       any_died = true;
     }

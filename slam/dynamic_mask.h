@@ -64,6 +64,7 @@ class DynamicMask {
     bool alive = false;
     bool person = false;
     float strength = 0;             // how sure the detector is, added up
+    bool sure = false;              // it was sure once
     std::int64_t confirmed_ns = 0;  // by a detection, or by its motion
     bool masked = true;             // false: taken for a false detection, as long as nothing else speaks for it
   };

@@ -33,8 +33,25 @@ void MoverCarrier::carry(const DepthGrid& from, std::span<const std::uint8_t> la
       labels_to[c] = std::max(labels_to[c], labels_from[cell]);  // of two that meet the same one wins, whatever the order
     }
   }
+  close_seams(to, labels_to);
   grow(to, reach, labels_to);
   fill_holes(to, labels_to);
+}
+
+/// A surface that comes nearer leaves lines of cells out between those it is carried to.
+void MoverCarrier::close_seams(const DepthGrid& to, std::span<std::uint8_t> labels_to) {
+  const auto columns = static_cast<std::size_t>(to.columns());
+  const auto shared = [&](std::size_t a, std::size_t cell, std::size_t b) {
+    const bool one = labels_to[a] != 0 && mover_of(labels_to[a]) == mover_of(labels_to[b]) && is_one_surface(to[a], to[cell]) &&
+                     is_one_surface(to[cell], to[b]);
+    return one ? std::min(labels_to[a], labels_to[b]) : std::uint8_t{0};
+  };
+  for (std::size_t cell = columns + 1; cell + columns + 1 < labels_to.size(); ++cell) {
+    if (labels_to[cell] == 0) {
+      const std::uint8_t label = std::max(shared(cell - 1, cell, cell + 1), shared(cell - columns, cell, cell + columns));
+      labels_to[cell] = label;
+    }
+  }
 }
 
 void MoverCarrier::grow(const DepthGrid& to, int reach, std::span<std::uint8_t> labels_to) {

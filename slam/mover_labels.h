@@ -30,6 +30,7 @@ class MoverCarrier {
              std::span<std::uint8_t> labels_to);
 
  private:
+  void close_seams(const DepthGrid& to, std::span<std::uint8_t> labels_to);
   void grow(const DepthGrid& to, int reach, std::span<std::uint8_t> labels_to);
 
   GridCamera camera_;
