@@ -43,6 +43,11 @@ struct HealthReport {
   std::uint64_t detections_dropped = 0;    ///< handed back by the full queue before the publisher
   std::uint64_t detector_errors = 0;       ///< frames on which its library failed
 
+  float masked_share = 0;         ///< of the newest frame's image that shows movers, 0 to 1
+  std::int32_t people = 0;        ///< movers in it that a detection explains
+  std::int32_t other_movers = 0;  ///< movers in it that only their motion gives away
+  TimeNs detection_age_ns = -1;   ///< of the person detections it used; -1: none were
+
   LatencySummary track;           ///< time in the tracker a frame
   LatencySummary latency;         ///< capture to publish
   LatencySummary map;             ///< time in the mapper a keyframe

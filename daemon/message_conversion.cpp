@@ -87,6 +87,7 @@ pose_t to_pose_message(const PoseEstimate& estimate, const Se3& T_base_camera, T
   message.matches = estimate.matches;
   message.inliers = estimate.inliers;
   message.detection_age_ns = estimate.detection_age_ns;
+  message.masked_share = estimate.masked_share;
   return message;
 }
 
@@ -166,6 +167,10 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.track = to_message(health.track);
   message.latency = to_message(health.latency);
   message.map = to_message(health.map);
+  message.masked_share = health.masked_share;
+  message.people = health.people;
+  message.other_movers = health.other_movers;
+  message.detection_age_ns = health.detection_age_ns;
   message.detect = to_message(health.detect);
   message.detect_overrun = to_message(health.detect_overrun);
   return message;

@@ -23,6 +23,10 @@ void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
 
   track_time_.record(estimate.track_ns);
   state_.store(estimate.state, std::memory_order_relaxed);
+  masked_share_.store(estimate.masked_share, std::memory_order_relaxed);
+  people_.store(estimate.people, std::memory_order_relaxed);
+  other_movers_.store(estimate.other_movers, std::memory_order_relaxed);
+  detection_age_ns_.store(estimate.detection_age_ns, std::memory_order_relaxed);
   (estimate.has_pose() ? tracked_ : lost_).add();
   if ((estimate.keyframe || estimate.asks_where) && candidate != nullptr) {
     keyframes_.add(estimate.keyframe ? 1 : 0);
@@ -63,6 +67,10 @@ void TrackingStage::close_outputs() {
 
 void TrackingStage::report(HealthReport& health) const {
   health.state = state_.load(std::memory_order_relaxed);
+  health.masked_share = masked_share_.load(std::memory_order_relaxed);
+  health.people = people_.load(std::memory_order_relaxed);
+  health.other_movers = other_movers_.load(std::memory_order_relaxed);
+  health.detection_age_ns = detection_age_ns_.load(std::memory_order_relaxed);
   health.frames_tracked = tracked_.value();
   health.frames_lost = lost_.value();
   health.keyframes = keyframes_.value();

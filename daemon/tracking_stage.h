@@ -58,6 +58,10 @@ class TrackingStage {
   std::function<void(const TrackedView&)> on_tracked_;
 
   std::atomic<TrackingState> state_{TrackingState::Initializing};
+  std::atomic<float> masked_share_{0};
+  std::atomic<std::int32_t> people_{0};
+  std::atomic<std::int32_t> other_movers_{0};
+  std::atomic<TimeNs> detection_age_ns_{-1};
   Counter tracked_;
   Counter lost_;
   Counter keyframes_;

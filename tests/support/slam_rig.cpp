@@ -61,7 +61,7 @@ PoseEstimate SlamRig::track(std::uint64_t index, const Spoil& spoil, Mapping map
   if (spoil) {
     spoil(*frame);
   }
-  const PoseEstimate estimate = tracker_->track(*frame, snapshot_, mapping == Mapping::Never ? nullptr : &record_);
+  const PoseEstimate estimate = tracker_->track(*frame, snapshot_, nullptr, mapping == Mapping::Never ? nullptr : &record_);
   if (estimate.keyframe) {
     T_world_keyframe_[record_.id] = true_pose(index);
   }
@@ -95,7 +95,7 @@ SlamRig::SavedMap SlamRig::save(const std::string& file) const {
 }
 
 void SlamRig::restart() {
-  tracker_.emplace(config_.tracker, config_.mapper, MapMode::Mapping, config_.intrinsics, Se3());
+  tracker_.emplace(config_.tracker, config_.mapper, config_.dynamic, MapMode::Mapping, config_.intrinsics, Se3());
   mapper_.emplace(config_.tracker, config_.mapper, MapMode::Mapping, config_.intrinsics);
   snapshot_ = MapSnapshot();
   T_world_keyframe_.clear();

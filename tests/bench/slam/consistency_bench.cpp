@@ -87,7 +87,7 @@ class Run {
  public:
   Run(const Config& config, SyntheticWorldKind world, std::int64_t seed, double duration_s)
       : pool_(config.intrinsics.width, config.intrinsics.height, 1),
-        tracker_(config.tracker, config.mapper, MapMode::Mapping, config.intrinsics, Se3()),
+        tracker_(config.tracker, config.mapper, config.dynamic, MapMode::Mapping, config.intrinsics, Se3()),
         mapper_(config.tracker, config.mapper, MapMode::Mapping, config.intrinsics) {
     SyntheticConfig synthetic;
     synthetic.world = world;
@@ -105,7 +105,7 @@ class Run {
       if (!camera_->render(i, *frame)) {
         std::abort();
       }
-      const PoseEstimate estimate = tracker_.track(*frame, snapshot_, &record_);
+      const PoseEstimate estimate = tracker_.track(*frame, snapshot_, nullptr, &record_);
       if (estimate.has_pose() && estimate.map_id == 1 && i > 0) {
         const Vector6d xi = (estimate.T_map_camera().inverse() * truth(i)).log();
         statistics.count(xi, estimate.covariance);

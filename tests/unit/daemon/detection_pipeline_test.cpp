@@ -62,6 +62,7 @@ class DetectionPipelineTest : public ::testing::Test {
     parts.source = std::make_unique<FakeSource>(std::move(script));
     auto tracker = std::make_unique<FakeTracker>();
     tracker->on_frame = on_frame_;
+    tracker->on_detections = on_known_;
     parts.tracker = std::move(tracker);
     parts.mapper = std::make_unique<FakeMapper>();
     parts.transport = std::make_unique<FakeTransport>(log_);
@@ -82,6 +83,7 @@ class DetectionPipelineTest : public ::testing::Test {
   std::unique_ptr<FakeDetector> owned_detector_ = std::make_unique<FakeDetector>();
   FakeDetector& detector_ = *owned_detector_;
   std::function<void(const RgbdFrame&)> on_frame_ = [](const RgbdFrame&) {};
+  std::function<void(const RgbdFrame&, const Detections*)> on_known_ = [](const RgbdFrame&, const Detections*) {};
   std::shared_ptr<TransportLog> log_ = std::make_shared<TransportLog>();
   std::vector<std::uint64_t> estimates_;  // both written by the publisher thread, read after it has drained
   std::vector<std::uint64_t> looked_at_;
@@ -108,6 +110,41 @@ TEST_F(DetectionPipelineTest, LockstepLooksAtEveryFrameUnhurried) {
   EXPECT_EQ(health.detected, 100U);
   EXPECT_EQ(health.detections_dropped + health.detections_abandoned + health.detector_errors, 0U);
   EXPECT_EQ(log_->decoded<status_t>("T_STATUS").back().detected, 100);
+}
+
+TEST_F(DetectionPipelineTest, InLockstepTheTrackerLearnsOfPeopleAFixedNumberOfFramesLate) {
+  for (const int lag : {0, 2, 5}) {
+    SCOPED_TRACE(lag);
+    config_.dynamic.lockstep_lag = lag;
+    owned_detector_ = std::make_unique<FakeDetector>();
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> known;  // frame, and the one whose people it knows
+    int ignorant = 0;
+    on_known_ = [&](const RgbdFrame& frame, const Detections* newest) {
+      ASSERT_NE(newest, nullptr);
+      if (newest->image_width == 0) {
+        ++ignorant;
+      } else {
+        known.emplace_back(frame.sequence, newest->sequence);
+      }
+    };
+    run(*make(FakeSource::recording(30), Pacing::Lockstep));
+    EXPECT_EQ(ignorant, lag);
+    ASSERT_EQ(known.size(), 30U - static_cast<std::size_t>(lag));
+    for (const auto& [frame, looked_at] : known) {
+      EXPECT_EQ(frame, looked_at + static_cast<std::uint64_t>(lag));
+    }
+  }
+}
+
+TEST_F(DetectionPipelineTest, InRealTimeTheTrackerGetsTheNewestPeopleKnown) {
+  std::atomic<std::uint64_t> newest_known{0};
+  on_known_ = [&](const RgbdFrame& frame, const Detections* newest) {
+    ASSERT_NE(newest, nullptr);
+    EXPECT_LE(newest->sequence, frame.sequence + config_.pipeline.frame_queue + 2) << "of a frame that is not there yet";
+    EXPECT_GE(newest->sequence, newest_known.load()) << "older than what was known before";
+    newest_known = newest->sequence;
+  };
+  run(*make(FakeSource::recording(200), Pacing::Realtime));
 }
 
 TEST_F(DetectionPipelineTest, ADetectorThatNeverEndsDelaysNobody) {

@@ -105,8 +105,12 @@ class FakeTracker final : public FrameTracker {
   std::function<TrackingState(std::uint64_t sequence)> state = [](std::uint64_t) { return TrackingState::Tracking; };
   std::function<void(const RgbdFrame&)> on_frame = [](const RgbdFrame&) {};
 
-  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, KeyframeRecord* candidate) override {
+  std::function<void(const RgbdFrame&, const Detections*)> on_detections = [](const RgbdFrame&, const Detections*) {};
+
+  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest,
+                     KeyframeRecord* candidate) override {
     on_frame(frame);
+    on_detections(frame, newest);
     PoseEstimate estimate;
     estimate.sequence = frame.sequence;
     estimate.capture_ns = frame.capture_ns;

@@ -42,6 +42,7 @@ PoseEstimate tracked_estimate() {
   estimate.map_id = 3;
   estimate.map_version = 17;
   estimate.detection_age_ns = 30'000'000;
+  estimate.masked_share = 0.25F;
   return estimate;
 }
 
@@ -78,6 +79,7 @@ TEST(PoseMessage, CarriesStampsAndCounts) {
   EXPECT_EQ(message.map_id, 3);
   EXPECT_EQ(message.map_version, 17);
   EXPECT_EQ(message.detection_age_ns, 30'000'000);
+  EXPECT_EQ(message.masked_share, 0.25F);
 }
 
 TEST(PoseMessage, TransformsChainAsTheirNamesSay) {
