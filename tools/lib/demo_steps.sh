@@ -118,6 +118,12 @@ show_synthetic_replay() {
   show_replay "$1" "$2" "$recording/groundtruth.txt" --sequence "$recording" --camera "$recording/camera.toml"
 }
 
+# show_again NAME TITLE RECORDING OPTION...: the recording of an earlier show_synthetic_replay once more, with other options.
+show_again() {
+  local recording=$results/recording-$3
+  show_replay "$1" "$2" "$recording/groundtruth.txt" --sequence "$recording" --camera "$recording/camera.toml" "${@:4}"
+}
+
 # print_row NAME VALUES: a line of the table; VALUES is the name of an array.
 print_row() {
   local -n values=$2

@@ -187,8 +187,8 @@ std::string to_markdown(const std::vector<Row>& rows) {
     const ErrorStatistics& e = row.run.ate_m;
     text += fmt::format("| {} | {} | {:.1f} % | {:.4f} | {:.4f} | {:.4f} | {:.4f} | {} | {:.1f}, {:.1f} |\n", row.sequence,
                         name_of(row.mode), 100 * row.run.coverage, e.rmse, e.median, e.mean, e.std,
-                        row.improvement ? fmt::format("{:.1f} %", 100 * *row.improvement) : "", to_ms(row.run.track.p50_ns),
-                        to_ms(row.run.track.p99_ns));
+                        row.improvement ? fmt::format("{:.1f} %", 100 * *row.improvement) : "", row.run.track.p50_ms,
+                        row.run.track.p99_ms);
   }
   return text;
 }
@@ -199,7 +199,7 @@ std::string to_csv(const std::vector<Row>& rows) {
     const ErrorStatistics& e = row.run.ate_m;
     text += fmt::format("{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{:.3f},{:.3f}\n", row.sequence, name_of(row.mode),
                         row.run.coverage, e.rmse, e.median, e.mean, e.std, row.improvement ? fmt::format("{:.6f}", *row.improvement) : "",
-                        to_ms(row.run.track.p50_ns), to_ms(row.run.track.p99_ns));
+                        row.run.track.p50_ms, row.run.track.p99_ms);
   }
   return text;
 }
