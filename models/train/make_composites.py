@@ -62,35 +62,40 @@ def cut_out(sample: Sample, index: int, least_height: float, largest_side: int =
     return CutOut(piece[area_of_person], alpha[area_of_person], bool(box[3] > height - 3))
 
 
+def placed(person: CutOut, width: int, height: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """The person as a layer of width x height, near and maybe beyond its edges: colours, and how much they cover (0 to 1)."""
+    size = min(height * rng.uniform(0.55, 1.7) / person.image.shape[0], 1.2 * width / person.image.shape[1])
+    look = cv2.resize(person.image, None, fx=size, fy=size, interpolation=cv2.INTER_LINEAR if size > 1 else cv2.INTER_AREA)
+    alpha = cv2.resize(person.alpha, (look.shape[1], look.shape[0]), interpolation=cv2.INTER_LINEAR)
+    if rng.random() < 0.5:
+        look, alpha = look[:, ::-1], alpha[:, ::-1]
+    gain, offset = rng.uniform(0.75, 1.2), rng.uniform(-15, 15)
+    look = np.clip(look * gain + offset, 0, 255)
+    h, w = alpha.shape
+    x = int(rng.uniform(-0.4 * w, width - 0.6 * w))
+    if person.cut_below:
+        highest, lowest = max(height - h, 0), 0.5 * height
+    else:
+        highest, lowest = min(height - h, 0.05 * height), max(height - h, 0.15 * height)
+    y = int(rng.uniform(highest, max(highest, lowest)))
+    matrix = np.float32([[1, 0, x], [0, 1, y]])
+    layer = cv2.warpAffine(look.astype(np.float32), matrix, (width, height))
+    cover = cv2.warpAffine(alpha.astype(np.float32), matrix, (width, height))
+    if rng.random() < 0.3:  # behind what stands in the lower part of the background
+        edge = np.interp(np.arange(width), [0, width], rng.uniform(0.6, 0.95, 2) * height)
+        cover = cover * (np.arange(height)[:, None] < edge)
+    return layer, cover
+
+
 def composite(background: np.ndarray, people: list[CutOut], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """People into a background, the last one in front; the image and the boxes of what is seen of each."""
-    image = background.copy()
+    """People into a background, the last one in front; the image and the boxes of what is seen of each. Slivers have none."""
+    image = background
     height, width = image.shape[:2]
     visible: list[np.ndarray] = []
     for person in people:
-        size = height * rng.uniform(0.55, 1.7) / person.image.shape[0]
-        if person.image.shape[1] * size > 1.2 * width:
-            size = 1.2 * width / person.image.shape[1]
-        look = cv2.resize(person.image, None, fx=size, fy=size, interpolation=cv2.INTER_LINEAR if size > 1 else cv2.INTER_AREA)
-        alpha = cv2.resize(person.alpha, (look.shape[1], look.shape[0]), interpolation=cv2.INTER_LINEAR)
-        if rng.random() < 0.5:
-            look, alpha = look[:, ::-1], alpha[:, ::-1]
-        gain, offset = rng.uniform(0.75, 1.2), rng.uniform(-15, 15)
-        look = np.clip(look * gain + offset, 0, 255)
-        h, w = alpha.shape
-        x = int(rng.uniform(-0.4 * w, width - 0.6 * w))
-        lowest = max(height - h, int(0.15 * height))
-        y = int(rng.uniform(min(height - h, 0.05 * height), lowest)) if not person.cut_below else int(rng.uniform(max(height - h, 0), 0.5 * height))
-        if person.cut_below:
-            y = max(y, height - h)
-        matrix = np.float32([[1, 0, x], [0, 1, y]])
-        layer = cv2.warpAffine(look.astype(np.float32), matrix, (width, height))
-        cover = cv2.warpAffine(alpha.astype(np.float32), matrix, (width, height))
-        if rng.random() < 0.3:  # behind what stands in the lower part of the background
-            edge = np.interp(np.arange(width), [0, width], rng.uniform(0.6, 0.95, 2) * height)
-            cover = cover * (np.arange(height)[:, None] < edge)
+        layer, cover = placed(person, width, height, rng)
         image = (image * (1 - cover[..., None]) + layer * cover[..., None]).astype(np.uint8)
-        visible = [v * (cover < 0.5) for v in visible] + [cover >= 0.5]
+        visible = [v & (cover < 0.5) for v in visible] + [cover >= 0.5]
     boxes = []
     for mask in visible:
         ys, xs = np.nonzero(mask)
