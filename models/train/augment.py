@@ -17,6 +17,7 @@ from dataset import Sample
 class Augmentation:
     mosaic: float = 0.5  # probability of four images in one
     zoom_crop: float = 0.3  # probability, without a mosaic, of a crop into a person
+    zoom_side: tuple[float, float] = (0.5, 1.6)  # the crop's side, in longer sides of the person
     scale: tuple[float, float] = (0.6, 1.6)
     stretch: float = 0.25  # largest change of the proportions: the training images are squeezed
     mirror: float = 0.5
@@ -34,13 +35,21 @@ class Augmentation:
     large_side: float = 64.0  # [pixels] a part so large is a person, whatever the share
 
 
+# `general`: people at all distances. `near`: more of what a robot indoors sees, people who fill half the image or more and are cut by
+# its edges.
+AUGMENTATIONS = {
+    "general": Augmentation(),
+    "near": Augmentation(mosaic=0.2, zoom_crop=0.6, zoom_side=(0.6, 2.0), paste=0.1),
+}
+
+
 def crop_window(sample: Sample, options: Augmentation, rng: np.random.Generator) -> np.ndarray:
     """The part of the image to show (x_min, y_min, x_max, y_max) [pixels]; it may reach beyond the image."""
     height, width = sample.image.shape[:2]
     if len(sample.boxes) and rng.random() < options.zoom_crop:
         box = sample.boxes[rng.integers(len(sample.boxes))]
         side = max(box[2] - box[0], box[3] - box[1], 24.0)
-        size = side * rng.uniform(0.5, 1.6)
+        size = side * rng.uniform(*options.zoom_side)
         centre = rng.uniform(box[:2], box[2:])
         half = 0.5 * size * np.array([1.0, rng.uniform(0.75, 1.0)])
         return np.concatenate((centre - half, centre + half))

@@ -5,13 +5,20 @@ The truth is a folder of images and labels, as for training, or a text file of l
 of the first one 0]. Names are those of the boxes: of the image without its ending, or the stamp. An image of the truth without any box
 that was written counts as one in which nobody was found. Boxes of images that the truth does not name are an error or, with --others-empty,
 false: nobody is there.
+
+Truth boxes may reach over what hides a person. With --masks, the folder of images NAME.png that are not zero where somebody is seen,
+--least-area is about the pixels of the mask in the box, and people of whom less than --least-visible of the box is seen count neither as
+missed nor as found. The mask is everybody's: who stands behind another person counts as seen. --ignored names boxes, in the format of
+those found, that are neither right nor wrong: people of whom the truth does not speak.
 """
 from __future__ import annotations
 
 import argparse
 from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from boxes import iou_matrix
@@ -50,22 +57,59 @@ def area(boxes: np.ndarray) -> np.ndarray:
     return (boxes[:, 2:] - boxes[:, :2]).prod(1)
 
 
-def compare(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], overlap: float, least_area: float,
-            others_empty: bool = False) -> AveragePrecision:
-    """People smaller than `least_area` [pixels^2] count neither as missed nor, when found, as false."""
+def visible_pixels(boxes: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """How much of the mask lies in each box; pixels whose centre a box holds."""
+    sums = np.pad((mask > 0).astype(np.int64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    limits = np.array([mask.shape[1], mask.shape[0]] * 2)
+    x0, y0, x1, y1 = np.clip(np.ceil(boxes) + [0, 0, 1, 1], 0, limits).astype(int).T if len(boxes) else np.zeros((4, 0), int)
+    return sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0]
+
+
+def share_within(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """The largest share of each box that lies in one of the others."""
+    low, high = np.maximum(boxes[:, None, :2], others[None, :, :2]), np.minimum(boxes[:, None, 2:], others[None, :, 2:])
+    shared = np.maximum(high - low, 0).prod(2)
+    return (shared / np.maximum(area(boxes), 1e-9)[:, None]).max(1, initial=0)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What counts. People smaller than `least_area` [pixels^2], and boxes found there, count neither as missed nor as false."""
+
+    overlap: float = 0.5
+    least_area: float = 0.0
+    masks: Path | None = None
+    least_visible: float = 0.25
+    others_empty: bool = False
+
+    def counted(self, name: str, boxes: np.ndarray) -> np.ndarray:
+        if self.masks is None:
+            return area(boxes) >= self.least_area
+        mask = cv2.imread(str(self.masks / f"{name}.png"), cv2.IMREAD_GRAYSCALE)
+        if mask is None:
+            raise DataError(f"{self.masks / name}.png: no mask that can be read")
+        seen = visible_pixels(boxes, mask)
+        return (seen >= self.least_area) & (seen >= self.least_visible * area(boxes))
+
+
+def compare(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], measure: Measure,
+            ignored: dict[str, list[list[float]]] | None = None) -> AveragePrecision:
+    """Boxes that lie by half or more in an ignored one, and on nobody who counts, are left out."""
     unknown = sorted(set(found) - set(truth))
-    if others_empty:
+    if measure.others_empty:
         truth = truth | {name: np.zeros((0, 4)) for name in unknown}
     elif unknown:
         raise DataError(f"boxes of {unknown[0]} and {len(unknown) - 1} more, of which the truth says nothing")
-    ap = AveragePrecision(overlap)
+    ap = AveragePrecision(measure.overlap)
     for name, boxes in truth.items():
         rows = np.array(found.get(name, []), float).reshape(-1, 5)
-        large = area(boxes) >= least_area
-        on_large = iou_matrix(rows[:, 1:], boxes[large]).max(1, initial=0) >= overlap
-        on_small = iou_matrix(rows[:, 1:], boxes[~large]).max(1, initial=0) >= overlap
-        counted = on_large | (~on_small & (area(rows[:, 1:]) >= least_area))
-        ap.add(rows[counted, 1:], rows[counted, 0], boxes[large])
+        counted = measure.counted(name, boxes) if len(boxes) else np.zeros(0, bool)
+        on_counted = iou_matrix(rows[:, 1:], boxes[counted]).max(1, initial=0) >= measure.overlap
+        on_others = iou_matrix(rows[:, 1:], boxes[~counted]).max(1, initial=0) >= measure.overlap
+        left_out = np.array((ignored or {}).get(name, []), float).reshape(-1, 5)[:, 1:]
+        on_ignored = share_within(rows[:, 1:], left_out) >= 0.5
+        kept = on_counted | (~on_others & ~on_ignored & (area(rows[:, 1:]) >= measure.least_area))
+        ap.add(rows[kept, 1:], rows[kept, 0], boxes[counted])
     return ap
 
 
@@ -75,11 +119,15 @@ def main() -> int:
     parser.add_argument("truth", type=Path)
     parser.add_argument("--overlap", type=float, default=0.5, help="least intersection over union of a box that counts as found")
     parser.add_argument("--least-area", type=float, default=0.0, help="[pixels^2] smaller people are left out")
+    parser.add_argument("--masks", type=Path, help="folder of NAME.png, not zero where somebody is seen")
+    parser.add_argument("--least-visible", type=float, default=0.25, help="share of the box; with --masks, people seen less are left out")
+    parser.add_argument("--ignored", type=Path, help="lines as of the boxes found; what is found there is left out")
     parser.add_argument("--others-empty", action="store_true", help="images that the truth does not name show nobody")
     args = parser.parse_args()
     try:
         truth = read_truth(args.truth)
-        ap = compare(read_rows(args.found, 5), truth, args.overlap, args.least_area, args.others_empty)
+        measure = Measure(args.overlap, args.least_area, args.masks, args.least_visible, args.others_empty)
+        ap = compare(read_rows(args.found, 5), truth, measure, read_rows(args.ignored, 5) if args.ignored else None)
     except DataError as error:
         print(f"evaluate_boxes.py: {error}")
         return 65

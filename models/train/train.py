@@ -16,7 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from anchors import fit_anchors
-from augment import Augmentation, augmented
+from augment import AUGMENTATIONS, Augmentation, augmented
 from dataset import DataError, Sample, letterbox, read_folder
 from loss import DetectionLoss
 from metrics import AveragePrecision, decode, suppress
@@ -38,6 +38,7 @@ class Settings:
     warm_up_steps: int = 200
     ema_half_life_steps: int = 300
     close_mosaic: float = 0.85  # share of the training after which there are no mosaics
+    augmentation: str = "general"  # of augment.AUGMENTATIONS
 
 
 PRESETS = {
@@ -227,7 +228,7 @@ class Training:
 
     def run(self, last_step: int | None = None) -> None:
         """To the end, or to `last_step`; whatever is left is done by another run from the checkpoint."""
-        augmentation = Augmentation()
+        augmentation = AUGMENTATIONS[self.settings.augmentation]
         batches = Batches(self.samples, self.settings, augmentation, self.args.seed, self.steps, self.step)
         loader = torch.utils.data.DataLoader(batches, batch_size=None, shuffle=False, num_workers=self.args.workers,
                                              prefetch_factor=4 if self.args.workers else 2)
@@ -275,7 +276,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--no-fourth-layer", action="store_true")
     for name, field in Settings.__dataclass_fields__.items():
         parser.add_argument("--" + name.replace("_", "-"), type={"int": int, "float": float, "str": str}[field.type], default=None,
-                            help=f"instead of the preset's {name}")
+                            choices=AUGMENTATIONS if name == "augmentation" else None, help=f"instead of the preset's {name}")
     parser.add_argument("--longest-side", type=int, default=480, help="larger images are shrunk to this when they are read [pixels]")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     parser.add_argument("--threads", type=int, default=1)

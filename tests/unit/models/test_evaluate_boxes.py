@@ -2,8 +2,11 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import cv2
+import numpy as np
+
 from dataset import DataError
-from evaluate_boxes import compare, read_rows, read_truth
+from evaluate_boxes import Measure, compare, read_rows, read_truth
 
 
 class EvaluateBoxes(unittest.TestCase):
@@ -19,7 +22,7 @@ class EvaluateBoxes(unittest.TestCase):
     def test_counts_people_found_missed_and_imagined(self):
         truth = read_truth(self.file("people.txt", "# stamp box\n1.5 0 0 100 100\n2.5 0 0 100 100\n2.5 200 0 300 100\n"))
         found = read_rows(self.file("found.txt", "1.5 0.9 0 0 100 95\n2.5 0.8 400 0 500 100\n2.5 0.7 201 0 300 100\n"), 5)
-        ap = compare(found, truth, 0.5, 0.0)
+        ap = compare(found, truth, Measure())
         recall, precision, score = ap.curve()
         self.assertEqual(ap.truths, 3)
         self.assertEqual(recall.tolist(), [1 / 3, 1 / 3, 2 / 3])
@@ -29,7 +32,7 @@ class EvaluateBoxes(unittest.TestCase):
     def test_small_people_count_neither_way(self):
         truth = read_truth(self.file("people.txt", "a 0 0 100 100\na 200 200 205 205\nb 0 0 5 5\n"))
         found = read_rows(self.file("found.txt", "a 0.9 0 0 100 100\na 0.8 200 200 205 205\nb 0.7 50 50 54 54\n"), 5)
-        ap = compare(found, truth, 0.5, 1000.0)
+        ap = compare(found, truth, Measure(least_area=1000.0))
         self.assertEqual(ap.truths, 1)
         self.assertEqual(len(ap.scores), 1)
         self.assertEqual(ap.value(), 1.0)
@@ -40,11 +43,46 @@ class EvaluateBoxes(unittest.TestCase):
         with self.assertRaisesRegex(DataError, "none.txt"):
             read_rows(Path(self.folder.name) / "none.txt", 5)
         with self.assertRaisesRegex(DataError, "boxes of x"):
-            compare({"x": [[0.5, 0, 0, 1, 1]]}, {}, 0.5, 0.0)
+            compare({"x": [[0.5, 0, 0, 1, 1]]}, {}, Measure())
 
     def test_images_that_the_truth_does_not_name_may_be_empty_ones(self):
-        ap = compare({"x": [[0.5, 0, 0, 9, 9]]}, {}, 0.5, 0.0, others_empty=True)
+        ap = compare({"x": [[0.5, 0, 0, 9, 9]]}, {}, Measure(others_empty=True))
         self.assertEqual((ap.truths, ap.hits), (0, [False]))
+
+    def mask(self, name: str, *seen: tuple[int, int, int, int]) -> Path:
+        image = np.zeros((200, 400), np.uint8)
+        for x0, y0, x1, y1 in seen:
+            image[y0 : y1 + 1, x0 : x1 + 1] = 255
+        path = Path(self.folder.name) / f"{name}.png"
+        cv2.imwrite(str(path), image)
+        return path.parent
+
+    def test_people_hidden_for_the_most_part_count_neither_way(self):
+        truth = read_truth(self.file("people.txt", "a 0 0 99 99\na 200 0 299 99\n"))
+        found = {"a": [[0.9, 200, 0, 299, 99], [0.8, 0, 0, 99, 99]]}
+        masks = self.mask("a", (0, 0, 99, 99), (200, 0, 299, 19))
+        ap = compare(found, truth, Measure(masks=masks, least_visible=0.25))
+        self.assertEqual((ap.truths, ap.hits, ap.scores), (1, [True], [0.8]))
+        self.assertEqual(compare(found, truth, Measure(masks=masks, least_visible=0.19)).truths, 2)
+        self.assertEqual(compare({}, truth, Measure(masks=masks, least_visible=0.25)).truths, 1)
+
+    def test_the_least_area_is_of_what_is_seen(self):
+        truth = read_truth(self.file("people.txt", "a 0 0 99 99\n"))
+        masks = self.mask("a", (0, 0, 99, 49), (150, 0, 399, 199))
+        self.assertEqual(compare({}, truth, Measure(masks=masks, least_area=5000)).truths, 1)
+        self.assertEqual(compare({}, truth, Measure(masks=masks, least_area=5001)).truths, 0)
+
+    def test_a_mask_that_is_not_there_is_named(self):
+        truth = read_truth(self.file("people.txt", "lost 0 0 99 99\n"))
+        with self.assertRaisesRegex(DataError, "lost.png"):
+            compare({}, truth, Measure(masks=Path(self.folder.name)))
+
+    def test_boxes_in_an_ignored_one_are_left_out_unless_they_are_right(self):
+        truth = read_truth(self.file("people.txt", "a 0 0 100 100\n"))
+        ignored = read_rows(self.file("ignored.txt", "a 0.9 0 0 100 200\n"), 5)
+        found = {"a": [[0.9, 0, 0, 100, 100], [0.8, 10, 120, 60, 180], [0.7, 60, 120, 141, 180]]}
+        ap = compare(found, truth, Measure(), ignored)
+        self.assertEqual((ap.hits, ap.scores), ([True, False], [0.9, 0.7]))
 
 
 if __name__ == "__main__":
