@@ -53,7 +53,7 @@ class DetectionStage {
   FrameDetector* detector_;
   Links links_;
   std::function<void()> wake_publisher_;
-  bool complained_ = false;         // of the engine
+  bool complained_ = false;          // of the engine
   std::vector<Detections> delayed_;  // in lockstep, a ring: those that the tracker does not know yet
   std::size_t next_delayed_ = 0;
 

@@ -85,8 +85,9 @@ class Pipeline final : public App {
         saver_(*parts_.mapper, options.map_files.value_or(map_files(config.map)),
                is_lockstep() ? 0 : from_seconds(config.map.save_period_s), clock),
         mapping_(*parts_.mapper, links_.keyframes, links_.snapshots, saver_, clock),
-        detection_(parts_.detector.get(), {links_.newest_frame, links_.detections, links_.newest_detections},
-                   [this] { links_.estimates.wake_all(); }, config.dynamic.lockstep_lag),
+        detection_(
+            parts_.detector.get(), {links_.newest_frame, links_.detections, links_.newest_detections},
+            [this] { links_.estimates.wake_all(); }, config.dynamic.lockstep_lag),
         publish_({links_.estimates, links_.detections}, make_publisher(clock),
                  {std::move(options.on_estimate), std::move(options.on_detections)}, clock) {}
 

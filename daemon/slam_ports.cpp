@@ -14,8 +14,7 @@ class SlamTracker final : public FrameTracker {
       : tracker_(config.tracker, config.mapper, config.dynamic, config.map.mode, config.intrinsics,
                  config.camera.T_map_start * config.camera.T_base_camera) {}
 
-  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest,
-                     KeyframeRecord* candidate) override {
+  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest, KeyframeRecord* candidate) override {
     return tracker_.track(frame, map, newest, candidate);
   }
   const DynamicMask* last_mask() const override { return tracker_.last_mask(); }

@@ -11,7 +11,7 @@ namespace posed {
 struct TrackedView {
   const RgbdFrame& frame;
   const PoseEstimate& estimate;
-  const DynamicMask* mask;  ///< null: everything was taken for static
+  const DynamicMask* mask;   ///< null: everything was taken for static
   const Features* features;  ///< those that were kept; null: the tracker does not tell
 };
 

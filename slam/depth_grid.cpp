@@ -8,7 +8,7 @@ namespace posed {
 
 namespace {
 
-constexpr int kStep = 2;                                                 // [pixels] between samples
+constexpr int kStep = 2;                                                           // [pixels] between samples
 constexpr int kSamples = (DepthGrid::kCell / kStep) * (DepthGrid::kCell / kStep);  // a cell
 constexpr int kLeastSamples = kSamples / 4;
 
@@ -24,8 +24,7 @@ float lower_quartile(std::array<float, kSamples>& samples, int count) {
 
 }  // namespace
 
-DepthGrid::DepthGrid(int image_width, int image_height)
-    : columns_(cells_along(image_width)), rows_(cells_along(image_height)) {
+DepthGrid::DepthGrid(int image_width, int image_height) : columns_(cells_along(image_width)), rows_(cells_along(image_height)) {
   depth_m_.assign(static_cast<std::size_t>(columns_ * rows_), 0.0F);
 }
 

@@ -51,10 +51,14 @@ class DepthGrid {
     const int column = static_cast<int>(cell) % columns_;
     const int row = static_cast<int>(cell) / columns_;
     const auto stride = static_cast<std::size_t>(columns_);
-    if (row > 0) visit(cell - stride);
-    if (column > 0) visit(cell - 1);
-    if (column + 1 < columns_) visit(cell + 1);
-    if (row + 1 < rows_) visit(cell + stride);
+    if (row > 0)
+      visit(cell - stride);
+    if (column > 0)
+      visit(cell - 1);
+    if (column + 1 < columns_)
+      visit(cell + 1);
+    if (row + 1 < rows_)
+      visit(cell + stride);
   }
 
  private:

@@ -9,25 +9,28 @@ namespace posed {
 
 namespace {
 
-constexpr double kReachPeriod_s = 0.034;     // in which a mover's edge moves by at most a cell more
-constexpr int kMostReach = 5;                // [cells] a frame
-constexpr float kSameMover = 0.3F;           // of the smaller of two areas: they overlap by more, so they are one
+constexpr double kReachPeriod_s = 0.034;  // in which a mover's edge moves by at most a cell more
+constexpr int kMostReach = 5;             // [cells] a frame
+constexpr float kSameMover = 0.3F;        // of the smaller of two areas: they overlap by more, so they are one
 // A detector's looks add up to a person's strength as log-likelihoods do: a sure look gains, a miss loses, and boxes that come and
 // go on furniture stay below what it takes to stand against all appearance.
 constexpr float kStrengthCap = 4.0F;
 constexpr float kFoundGain = 0.5F;
-constexpr float kScoreGain = 3.0F;           // for each unit of score above...
-constexpr float kPlainScore = 0.4F;          // ...this
+constexpr float kScoreGain = 3.0F;   // for each unit of score above...
+constexpr float kPlainScore = 0.4F;  // ...this
 constexpr float kMissedLoss = 0.2F;
+// Boxes below this score are published, but nothing is masked for them, not even to confirm someone known: of the shipped networks
+// half of those are furniture, and a wrong box costs more of the static scene than a look without any.
+constexpr float kLeastScore = 0.5F;
 constexpr float kSureStrength = 1.5F;
-constexpr double kSureMemory = 2.0;          // times the memory of others
-constexpr float kAllStatic = 0.7F;           // share of a person's cells that were there before, which makes them doubtful
-constexpr float kAnyMoved = 0.05F;           // share of cells that have moved, which confirms a mover
-constexpr std::size_t kLeastCells = 6;       // of a mover
-constexpr int kMovedAround = 3;              // moved or masked neighbours without which a moved cell is taken for noise
-constexpr int kMovedReach = 10;              // [cells] from what has moved, over connected surface that may have
-constexpr int kStillStep = 2;                // [cells] that a cell counts for which was there a moment ago
-constexpr TimeNs kRecallNs = kNsPerSecond;   // a frame further back is not carried from
+constexpr double kSureMemory = 2.0;         // times the memory of others
+constexpr float kAllStatic = 0.7F;          // share of a person's cells that were there before, which makes them doubtful
+constexpr float kAnyMoved = 0.05F;          // share of cells that have moved, which confirms a mover
+constexpr std::size_t kLeastCells = 6;      // of a mover
+constexpr int kMovedAround = 3;             // moved or masked neighbours without which a moved cell is taken for noise
+constexpr int kMovedReach = 10;             // [cells] from what has moved, over connected surface that may have
+constexpr int kStillStep = 2;               // [cells] that a cell counts for which was there a moment ago
+constexpr TimeNs kRecallNs = kNsPerSecond;  // a frame further back is not carried from
 
 }  // namespace
 
@@ -116,6 +119,9 @@ void DynamicMask::take_in(const Detections& detections) {
   }
   const Entry& then = history_[(taken_ - 1 - back) % kHistory];
   for (const Detection& detection : detections.found()) {
+    if (detection.score < kLeastScore) {
+      break;  // they come most confident first
+    }
     segmentation_.segment(then.depth, detection.box, cells_);
     if (cells_.size() < kLeastCells) {
       continue;
@@ -156,7 +162,8 @@ void DynamicMask::meet(float score) {
     return;
   }
   const auto best = static_cast<std::size_t>(std::max_element(common.begin() + 1, common.end()) - common.begin());
-  const bool known = static_cast<float>(common[best]) >= kSameMover * static_cast<float>(std::min(own, area[best])) && area[best] > 0;
+  const bool known =
+      static_cast<float>(common[best]) >= kSameMover * static_cast<float>(std::min(own, area[best])) && area[best] > 0;
   const auto id = known ? static_cast<std::uint8_t>(best) : new_mover();
   if (id == 0) {
     return;  // more movers than anyone can tell apart
@@ -254,9 +261,8 @@ bool DynamicMask::add_moved(Entry& now) {
       return false;
     }
     int around = 0;
-    now.depth.for_each_around(cell, [&](std::size_t c) {
-      around += evidence_[c] == CellEvidence::Moved || now.labels[c] != 0 ? 1 : 0;
-    });
+    now.depth.for_each_around(cell,
+                              [&](std::size_t c) { around += evidence_[c] == CellEvidence::Moved || now.labels[c] != 0 ? 1 : 0; });
     return around >= kMovedAround;
   };
   bool added = false;
@@ -371,7 +377,8 @@ bool DynamicMask::is_mover(float x, float y, float depth_m) const {
   }
   bool mover = false;
   depth.for_each_around(cell, [&](std::size_t c) {
-    mover = mover || (masked_[c] != 0 && (depth_m <= 0 || (depth[c] > 0 && std::abs(depth_m - depth[c]) < 0.5F * depth_tolerance_m(depth[c]))));
+    mover = mover || (masked_[c] != 0 &&
+                      (depth_m <= 0 || (depth[c] > 0 && std::abs(depth_m - depth[c]) < 0.5F * depth_tolerance_m(depth[c]))));
   });
   return mover;
 }

@@ -8,6 +8,7 @@
 
 #include "config/dynamic_config.h"
 #include "core/detections.h"
+#include "core/estimates.h"
 #include "core/rgbd_frame.h"
 #include "core/se3.h"
 #include "slam/depth_grid.h"
@@ -31,8 +32,8 @@ class DynamicMask {
   struct Summary {
     float masked_share = 0;  ///< of the image, 0 to 1
     int people = 0;
-    int others = 0;                 ///< movers that no detection explains
-    TimeNs detection_age_ns = -1;   ///< of the newest detections taken in; -1: none, or too old to matter
+    int others = 0;                ///< movers that no detection explains
+    TimeNs detection_age_ns = -1;  ///< of the newest detections taken in; -1: none, or too old to matter
   };
 
   DynamicMask(const DynamicConfig& config, const PinholeCamera& camera);
@@ -58,6 +59,14 @@ class DynamicMask {
   const DepthGrid& depth() const { return newest().depth; }
   const GridCamera& camera() const { return camera_; }
   const Summary& summary() const { return summary_; }
+
+  /// Writes the summary into the estimate's own fields.
+  void report(PoseEstimate& estimate) const {
+    estimate.masked_share = summary_.masked_share;
+    estimate.people = summary_.people;
+    estimate.other_movers = summary_.others;
+    estimate.detection_age_ns = summary_.detection_age_ns;
+  }
 
  private:
   struct Mover {
@@ -103,7 +112,7 @@ class DynamicMask {
   std::uint64_t last_detection_ = 0;  // sequence number + 1 of the frame; 0: none
   std::int64_t last_detection_stamp_ns_ = 0;
   std::vector<CellEvidence> evidence_;
-  std::vector<std::uint8_t> carried_;   // one detection on its way to the present
+  std::vector<std::uint8_t> carried_;  // one detection on its way to the present
   std::vector<std::uint8_t> carried_2_;
   std::vector<std::uint32_t> cells_;
   std::vector<std::uint8_t> masked_;

@@ -27,8 +27,8 @@ void FreeSpace::judge(const DepthGrid& now, const Se3& T_odom_camera, std::int64
   for (std::size_t i = 0; i < count_; ++i) {
     const Reference& reference = references_[i];
     const bool long_ago = stamp_ns - reference.stamp_ns >= kStaticAge_ns;
-    compare(now, reference, reference.T_odom_camera.inverse() * T_odom_camera, long_ago ? CellEvidence::Static : CellEvidence::Still,
-            evidence);
+    compare(now, reference, reference.T_odom_camera.inverse() * T_odom_camera,
+            long_ago ? CellEvidence::Static : CellEvidence::Still, evidence);
   }
 }
 

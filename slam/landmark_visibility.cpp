@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slam/projection_matcher.h"
+
 namespace posed {
 
 namespace {
@@ -57,6 +59,29 @@ void judge_visibility(const MapSnapshot& map, const DynamicMask& mask, const Se3
       case Visibility::Refuted: record.refuted.push_back(landmark.id); break;
       case Visibility::Unclear: break;
     }
+  }
+}
+
+void copy_static(const FeatureFrame& frame, std::span<const std::int32_t> landmark_of, const MapSnapshot& map,
+                 const DynamicMask* mask, KeyframeRecord& record) {
+  record.features.keypoints.clear();
+  record.features.descriptors.clear();
+  record.ideal_pixels.clear();
+  record.depth_m.clear();
+  record.landmarks.clear();
+  record.hidden.clear();
+  record.refuted.clear();
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const Keypoint& keypoint = frame.features().keypoints[i];
+    if (mask != nullptr && mask->is_mover(keypoint.x, keypoint.y, frame.depth_m()[i])) {
+      continue;
+    }
+    record.features.keypoints.push_back(keypoint);
+    record.features.descriptors.push_back(frame.features().descriptors[i]);
+    record.ideal_pixels.push_back(frame.ideal_pixels()[i]);
+    record.depth_m.push_back(frame.depth_m()[i]);
+    const std::int32_t landmark = landmark_of[i];
+    record.landmarks.push_back(landmark == kUnmatched ? kNoLandmark : map.landmarks[static_cast<std::size_t>(landmark)].id);
   }
 }
 

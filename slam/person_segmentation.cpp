@@ -12,10 +12,10 @@ namespace {
 
 constexpr int kClusters = 3;
 constexpr int kIterations = 6;
-constexpr float kOneSurface_m = 0.25F;     // clusters nearer to each other than this are one
-constexpr float kLeastShare = 0.25F;       // of the box's weight, that the nearest cluster must have to be the person
-constexpr float kBodyDepth_m = 0.45F;      // half of it: how far a body reaches from its middle, arms included
-constexpr float kGrowMargin = 0.12F;       // of the box's sides, how far a person may reach beyond it
+constexpr float kOneSurface_m = 0.25F;       // clusters nearer to each other than this are one
+constexpr float kLeastShare = 0.25F;         // of the box's weight, that the nearest cluster must have to be the person
+constexpr float kBodyDepth_m = 0.45F;        // half of it: how far a body reaches from its middle, arms included
+constexpr float kGrowMargin = 0.12F;         // of the box's sides, how far a person may reach beyond it
 constexpr std::size_t kLeastPieceShare = 8;  // a piece of less than one part in so many of the largest one is not the person's
 
 }  // namespace
@@ -67,12 +67,12 @@ PersonSegmentation::Cluster PersonSegmentation::person_cluster() const {
     std::array<float, kClusters> sum{};
     std::array<float, kClusters> square{};
     for (const Sample& s : samples_) {
-      const auto nearest = static_cast<std::size_t>(
-          std::min_element(clusters.begin(), clusters.end(),
-                           [&](const Cluster& a, const Cluster& b) {
-                             return std::abs(a.depth_m - s.depth_m) < std::abs(b.depth_m - s.depth_m);
-                           }) -
-          clusters.begin());
+      const auto nearest =
+          static_cast<std::size_t>(std::min_element(clusters.begin(), clusters.end(),
+                                                    [&](const Cluster& a, const Cluster& b) {
+                                                      return std::abs(a.depth_m - s.depth_m) < std::abs(b.depth_m - s.depth_m);
+                                                    }) -
+                                   clusters.begin());
       weight[nearest] += s.weight;
       sum[nearest] += s.weight * s.depth_m;
       square[nearest] += s.weight * s.depth_m * s.depth_m;
@@ -100,13 +100,15 @@ PersonSegmentation::Cluster PersonSegmentation::person_cluster() const {
     }
   }
   // Who fills a good part of the box's middle and is in front is the person; else whatever fills most of it.
-  const auto in_front = std::find_if(clusters.begin(), clusters.end(), [&](const Cluster& c) { return c.weight >= kLeastShare * all; });
-  return in_front != clusters.end()
-             ? *in_front
-             : *std::max_element(clusters.begin(), clusters.end(), [](const Cluster& a, const Cluster& b) { return a.weight < b.weight; });
+  const auto in_front =
+      std::find_if(clusters.begin(), clusters.end(), [&](const Cluster& c) { return c.weight >= kLeastShare * all; });
+  return in_front != clusters.end() ? *in_front
+                                    : *std::max_element(clusters.begin(), clusters.end(),
+                                                        [](const Cluster& a, const Cluster& b) { return a.weight < b.weight; });
 }
 
-void PersonSegmentation::grow(const DepthGrid& depth, const Range& range, const Cluster& person, std::vector<std::uint32_t>& cells) {
+void PersonSegmentation::grow(const DepthGrid& depth, const Range& range, const Cluster& person,
+                              std::vector<std::uint32_t>& cells) {
   std::fill(seen_.begin(), seen_.end(), std::uint8_t{0});
   const float seed_reach_m = std::clamp(2.0F * person.deviation_m, 0.15F, kBodyDepth_m);
   std::size_t largest = 0;
@@ -146,9 +148,8 @@ void PersonSegmentation::segment(const DepthGrid& depth, const BoundingBox& box,
   if (samples_.empty()) {
     return;
   }
-  std::sort(samples_.begin(), samples_.end(), [](const Sample& a, const Sample& b) {
-    return a.depth_m != b.depth_m ? a.depth_m < b.depth_m : a.cell < b.cell;
-  });
+  std::sort(samples_.begin(), samples_.end(),
+            [](const Sample& a, const Sample& b) { return a.depth_m != b.depth_m ? a.depth_m < b.depth_m : a.cell < b.cell; });
   grow(depth, cells_of(box, kGrowMargin), person_cluster(), cells);
 }
 

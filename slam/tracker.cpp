@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "core/clock.h"
 #include "slam/drift_model.h"
@@ -12,6 +13,7 @@
 #include "slam/landmark_visibility.h"
 #include "slam/motion_model.h"
 #include "slam/orb_extractor.h"
+#include "slam/pose_covariance.h"
 
 namespace posed {
 
@@ -24,8 +26,8 @@ constexpr int kFewMatches = 40;
 constexpr KeyframeId kYoungMapKeyframes = 5;  // the only map is not worth finding again where it is lost before it has as many
 constexpr int kRecoveriesPerFrame = 2;        // keyframes tried a frame, so that a lost tracker stays in its time
 constexpr int kMinRecoveryInliers = 15;
-constexpr float kMoverTrust = 0.1F;     // weight of a feature on a mover, where there is too little else
-constexpr float kMuchMasked = 0.2F;     // share of the image without which movers are not to blame for a loss
+constexpr float kMoverTrust = 0.1F;  // weight of a feature on a mover, where there is too little else
+constexpr float kMuchMasked = 0.2F;  // share of the image without which movers are not to blame for a loss
 constexpr int kCloseTracked = 100;   // fewer close landmarks tracked and...
 constexpr int kCloseUntracked = 70;  // ...more close keypoints unmatched than this asks for a keyframe
 
@@ -43,7 +45,6 @@ struct Tracker::Impl {
   void extract(const RgbdFrame& rgbd);
   void extract_warily(const RgbdFrame& rgbd);
   void leave_movers_out(const MapSnapshot& map);
-  bool is_mover(std::size_t keypoint) const;
   void adopt(const MapSnapshot& map);
   bool can_initialize() const;
   bool is_young() const { return last_keyframe - map_begin < kYoungMapKeyframes; }
@@ -59,7 +60,6 @@ struct Tracker::Impl {
   void fill_keyframe(KeyframeRecord& record, const MapSnapshot& map);
   bool may_ask(const MapSnapshot& map) const;
   void fill_features(KeyframeRecord& record, const MapSnapshot& map) const;
-  Matrix6d covariance_with_drift(const MapSnapshot& map);
   void remember(const MapSnapshot& map);
   void refer_to_keyframe(const MapSnapshot& map, PoseEstimate& estimate) const;
 
@@ -122,14 +122,9 @@ Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, co
 
 /// Features of what is not known to move; as many as without movers, so that the static rest gets more.
 void Tracker::Impl::extract(const RgbdFrame& rgbd) {
-  if (!mask) {
-    extractor.extract(rgbd.gray, frame.features());
-    frame.place(camera, rgbd.depth_m);
-    return;
-  }
-  extractor.extract(rgbd.gray, frame.features(), mask->interior());
+  extractor.extract(rgbd.gray, frame.features(), mask ? mask->interior() : std::span<const std::uint8_t>());
   frame.place(camera, rgbd.depth_m,
-              [this](const Keypoint& k, float depth_m) { return mask->is_mover(k.x, k.y, depth_m) ? 0.0F : 1.0F; });
+              [this](const Keypoint& k, float depth_m) { return mask && mask->is_mover(k.x, k.y, depth_m) ? 0.0F : 1.0F; });
 }
 
 /// Where what is left does not carry a pose: features of movers too, at little weight. They may stand still, after all, and if they
@@ -139,11 +134,6 @@ void Tracker::Impl::extract_warily(const RgbdFrame& rgbd) {
   frame.place(camera, rgbd.depth_m,
               [this](const Keypoint& k, float depth_m) { return mask->is_mover(k.x, k.y, depth_m) ? kMoverTrust : 1.0F; });
   localizer.reset(frame);
-}
-
-bool Tracker::Impl::is_mover(std::size_t keypoint) const {
-  const Keypoint& k = frame.features().keypoints[keypoint];
-  return mask && mask->is_mover(k.x, k.y, frame.depth_m()[keypoint]);
 }
 
 /// With the pose known, more may turn out to move than was known before; the pose is then sought once more without it.
@@ -159,7 +149,11 @@ void Tracker::Impl::leave_movers_out(const MapSnapshot& map) {
     return;
   }
   spare = localizer;
-  if (localizer.drop_where([this](std::size_t i) { return is_mover(i); }) > 0 &&
+  const auto is_mover = [this](std::size_t i) {
+    const Keypoint& k = frame.features().keypoints[i];
+    return mask->is_mover(k.x, k.y, frame.depth_m()[i]);
+  };
+  if (localizer.drop_where(is_mover) > 0 &&
       !(localizer.solve(map, frame, spare.solution().T_map_camera) && localizer.solution().inliers >= config.min_inliers)) {
     localizer = spare;
   }
@@ -279,24 +273,7 @@ void Tracker::Impl::fill_features(KeyframeRecord& record, const MapSnapshot& map
   record.map_id = map_id;
   record.T_map_odom = T_map_odom;
   record.starts_map = starts_map;
-  record.features.keypoints.clear();
-  record.features.descriptors.clear();
-  record.ideal_pixels.clear();
-  record.depth_m.clear();
-  record.landmarks.clear();
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    if (is_mover(i)) {
-      continue;  // no map shall ever hold one
-    }
-    record.features.keypoints.push_back(frame.features().keypoints[i]);
-    record.features.descriptors.push_back(frame.features().descriptors[i]);
-    record.ideal_pixels.push_back(frame.ideal_pixels()[i]);
-    record.depth_m.push_back(frame.depth_m()[i]);
-    const std::int32_t landmark = localizer.landmark_of()[i];
-    record.landmarks.push_back(landmark == kUnmatched ? kNoLandmark : map.landmarks[static_cast<std::size_t>(landmark)].id);
-  }
-  record.hidden.clear();
-  record.refuted.clear();
+  copy_static(frame, localizer.landmark_of(), map, mask ? &*mask : nullptr, record);
 }
 
 void Tracker::Impl::fill_keyframe(KeyframeRecord& record, const MapSnapshot& map) {
@@ -316,29 +293,6 @@ void Tracker::Impl::fill_keyframe(KeyframeRecord& record, const MapSnapshot& map
 bool Tracker::Impl::may_ask(const MapSnapshot& map) const {
   const bool waiting = asked && (!map.relocalization.answered || map.relocalization.sequence < asked_sequence);
   return has_map && map.version > 0 && state != TrackingState::Initializing && !waiting && can_initialize();
-}
-
-/// The solver's covariance takes the landmarks as exact; their own error is that of the keyframes they hang on.
-Matrix6d Tracker::Impl::covariance_with_drift(const MapSnapshot& map) {
-  if (starts_map) {
-    return start_covariance();
-  }
-  anchors.clear();
-  for (const std::int32_t landmark : localizer.landmark_of()) {
-    if (landmark != kUnmatched) {
-      anchors.push_back(map.landmarks[static_cast<std::size_t>(landmark)].anchor);
-    }
-  }
-  std::sort(anchors.begin(), anchors.end());
-  const PoseSolution& solution = localizer.solution();
-  InheritedDrift inherited;
-  for (auto first = anchors.cbegin(); first != anchors.cend();) {
-    const auto last = std::upper_bound(first, anchors.cend(), *first);
-    const SnapshotAnchor& anchor = map.anchors[*first];
-    inherited.add(static_cast<int>(last - first), anchor.T_map_camera.inverse() * solution.T_map_camera, anchor.covariance);
-    first = last;
-  }
-  return inherited.covariance(solution.covariance);
 }
 
 /// Keeps what the next frame is predicted from.
@@ -446,15 +400,13 @@ PoseEstimate Tracker::Impl::describe(const MapSnapshot& map, KeyframeRecord* can
   estimate.map_id = map_id;
   estimate.map_version = map.version;
   if (mask) {
-    estimate.masked_share = mask->summary().masked_share;
-    estimate.people = mask->summary().people;
-    estimate.other_movers = mask->summary().others;
-    estimate.detection_age_ns = mask->summary().detection_age_ns;
+    mask->report(estimate);
   }
   if (state == TrackingState::Tracking) {
     estimate.T_map_odom = T_map_odom;
     estimate.T_odom_camera = T_map_odom.inverse() * localizer.solution().T_map_camera;
-    estimate.covariance = covariance_with_drift(map);
+    estimate.covariance =
+        starts_map ? start_covariance() : pose_covariance(localizer.solution(), localizer.landmark_of(), map, anchors);
     estimate.inliers = localizer.solution().inliers;
     estimate.keyframe = candidate != nullptr && (starts_map || wants_keyframe(map));
     if (estimate.keyframe) {

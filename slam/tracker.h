@@ -15,17 +15,19 @@ namespace posed {
 
 /// Tracks the camera, frame by frame, against a snapshot of the map. Never waits, takes no lock and, after the first frames, does
 /// not allocate; it is bounded in time by the number of features and landmarks. A function of its inputs alone: the same frames
-/// with the same snapshots and detections give the same bits. What moves is left out of the pose and of keyframes. Thread-bound: one thread calls `track`.
+/// with the same snapshots and detections give the same bits. What moves is left out of the pose and of keyframes. Thread-bound:
+/// one thread calls `track`.
 class Tracker {
  public:
   /// `T_map_camera_start`: the camera's pose in the map frame when the first map begins. In `MapMode::Localization` none is begun.
-  Tracker(const TrackerConfig& config, const MapperConfig& mapper, const DynamicConfig& dynamic, MapMode mode, const CameraIntrinsics& camera,
-          const Se3& T_map_camera_start);
+  Tracker(const TrackerConfig& config, const MapperConfig& mapper, const DynamicConfig& dynamic, MapMode mode,
+          const CameraIntrinsics& camera, const Se3& T_map_camera_start);
   ~Tracker();
 
   /// The pose of `frame`. Where the frame should become a keyframe or, the camera being lost, the mapper should say where it is,
   /// and `candidate` is not null, fills `*candidate` and says so in `PoseEstimate::keyframe` or `asks_where`; the caller then hands
-  /// it to the mapper. `newest`: the people found last, in this frame or an earlier one; null: nobody looks. A null `candidate` (the mapper is behind) only delays it.
+  /// it to the mapper. `newest`: the people found last, in this frame or an earlier one; null: nobody looks. A null `candidate`
+  /// (the mapper is behind) only delays it.
   PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest, KeyframeRecord* candidate);
 
   /// Time spent in the parts of the last `track` [ns].

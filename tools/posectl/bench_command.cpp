@@ -198,8 +198,8 @@ std::string to_csv(const std::vector<Row>& rows) {
   for (const Row& row : rows) {
     const ErrorStatistics& e = row.run.ate_m;
     text += fmt::format("{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{:.3f},{:.3f}\n", row.sequence, name_of(row.mode),
-                        row.run.coverage, e.rmse, e.median, e.mean, e.std, row.improvement ? fmt::format("{:.6f}", *row.improvement) : "",
-                        row.run.track.p50_ms, row.run.track.p99_ms);
+                        row.run.coverage, e.rmse, e.median, e.mean, e.std,
+                        row.improvement ? fmt::format("{:.6f}", *row.improvement) : "", row.run.track.p50_ms, row.run.track.p99_ms);
   }
   return text;
 }
@@ -250,7 +250,8 @@ void add_bench_command(CLI::App& parent, const Console& console, int& exit_code)
   auto options = std::make_shared<BenchOptions>();
   CLI::App* bench = parent.add_subcommand("bench", "Measure on recordings with ground truth");
   bench->require_subcommand(1);
-  CLI::App* tum = bench->add_subcommand("tum", "Replay every sequence of the TUM RGB-D layout in a folder, in each mode, and print a table");
+  CLI::App* tum =
+      bench->add_subcommand("tum", "Replay every sequence of the TUM RGB-D layout in a folder, in each mode, and print a table");
   const std::map<std::string, DynamicMode> modes{
       {"off", DynamicMode::Off}, {"boxes", DynamicMode::Boxes}, {"full", DynamicMode::Full}};
   tum->add_option("--root", options->root, "Folder of sequences, or one sequence")->required()->check(CLI::ExistingDirectory);
@@ -259,7 +260,8 @@ void add_bench_command(CLI::App& parent, const Console& console, int& exit_code)
   tum->add_option("--dynamic", options->modes, "Modes, separated by commas: off, boxes, full; off,full unless given")
       ->delimiter(',')
       ->transform(CLI::CheckedTransformer(modes));
-  tum->add_option("--runs", options->runs, "Replays of each; the one with the median RMSE is shown. 1 unless given: lockstep repeats itself")
+  tum->add_option("--runs", options->runs,
+                  "Replays of each; the one with the median RMSE is shown. 1 unless given: lockstep repeats itself")
       ->check(CLI::Range(1, 1000));
   tum->add_flag("--realtime", options->realtime, "At the pace of the stamps instead of in lockstep");
   tum->add_option("--csv", options->csv, "Write the table there, too");

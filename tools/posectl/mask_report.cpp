@@ -34,7 +34,8 @@ int nearest(float coordinate, int size) {
 void dot(ImageView<std::uint8_t> bgr, float x, float y) {
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
-      std::uint8_t* const pixel = &bgr.at(nearest(x + static_cast<float>(dx), bgr.width), nearest(y + static_cast<float>(dy), bgr.height));
+      std::uint8_t* const pixel =
+          &bgr.at(nearest(x + static_cast<float>(dx), bgr.width), nearest(y + static_cast<float>(dy), bgr.height));
       pixel[0] = 0;
       pixel[1] = 255;
       pixel[2] = 0;
@@ -101,8 +102,7 @@ Status MaskReport::compare(const TrackedView& view) {
                                                       truth.height, depth.width, depth.height));
   }
   const auto judged = [&](float x, float y) {
-    return view.mask != nullptr &&
-           view.mask->is_mover(x, y, depth.at(nearest(x, depth.width), nearest(y, depth.height)));
+    return view.mask != nullptr && view.mask->is_mover(x, y, depth.at(nearest(x, depth.width), nearest(y, depth.height)));
   };
   const auto is_true = [&](float x, float y) { return truth.at(nearest(x, truth.width), nearest(y, truth.height)) != 0; };
   for (int y = 0; y < truth.height; y += kSampling) {
@@ -135,7 +135,8 @@ std::string MaskReport::summary() const {
   };
   return line("mask", pixels_) + line("features", found_) +
          fmt::format("kept         {:.0f} features a frame, {:.2f} % of them on movers\n",
-                     static_cast<double>(kept_) / static_cast<double>(frames_), 100 * share(kept_on_movers_, kept_ - kept_on_movers_));
+                     static_cast<double>(kept_) / static_cast<double>(frames_),
+                     100 * share(kept_on_movers_, kept_ - kept_on_movers_));
 }
 
 }  // namespace posed

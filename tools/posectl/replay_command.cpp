@@ -303,8 +303,7 @@ void add_replay_command(CLI::App& parent, const Console& console, int& exit_code
   command->add_option("--draw-every", options->masks.draw_every, "Frames from one picture to the next; 15 unless given")
       ->check(CLI::Range(1, 1'000'000))
       ->needs(draw);
-  command->add_option("--mask-truth", options->masks.truth,
-                      "Folder of true masks, STAMP.png, to compare what was left out with")
+  command->add_option("--mask-truth", options->masks.truth, "Folder of true masks, STAMP.png, to compare what was left out with")
       ->check(CLI::ExistingDirectory);
   CLI::Option* map_in = command->add_option("--map-in", options->map_in, "Begin with this saved map");
   CLI::Option* map_out = command->add_option("--map-out", options->map_out, "Save the map at the end");

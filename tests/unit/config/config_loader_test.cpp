@@ -233,7 +233,8 @@ TEST_F(ConfigLoader, UnknownTablesAreReportedOnce) {
             "posed.toml:1:11: pipeline.captur: unknown table; did you mean pipeline.capture?");
   EXPECT_EQ(error_of("[quantum]\nspin.up = 1"),
             "posed.toml:1:2: quantum: unknown table; allowed here: source, source.replay, source.synthetic, camera, tracker, "
-            "mapper, map, detector, dynamic, publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, pipeline.detector, "
+            "mapper, map, detector, dynamic, publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, "
+            "pipeline.detector, "
             "pipeline.publisher, logging");
 }
 

@@ -107,8 +107,7 @@ class FakeTracker final : public FrameTracker {
 
   std::function<void(const RgbdFrame&, const Detections*)> on_detections = [](const RgbdFrame&, const Detections*) {};
 
-  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest,
-                     KeyframeRecord* candidate) override {
+  PoseEstimate track(const RgbdFrame& frame, const MapSnapshot& map, const Detections* newest, KeyframeRecord* candidate) override {
     on_frame(frame);
     on_detections(frame, newest);
     PoseEstimate estimate;

@@ -17,7 +17,8 @@ constexpr std::int64_t kPeriod_ns = 33 * kNsPerMs;
 struct Rectangle {
   int x0, y0, x1, y1;  // [pixels] the last ones excluded
   BoundingBox box() const {
-    return {static_cast<float>(x0) - 0.5F, static_cast<float>(y0) - 0.5F, static_cast<float>(x1) - 0.5F, static_cast<float>(y1) - 0.5F};
+    return {static_cast<float>(x0) - 0.5F, static_cast<float>(y0) - 0.5F, static_cast<float>(x1) - 0.5F,
+            static_cast<float>(y1) - 0.5F};
   }
   bool holds(int x, int y) const { return x >= x0 && x < x1 && y >= y0 && y < y1; }
   Rectangle moved(int dx) const { return {x0 + dx, y0, x1 + dx, y1}; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -166,6 +167,43 @@ TEST(PosectlReplay, TracksTheSyntheticWorldTwiceAlike) {
   EXPECT_EQ(read_trajectory(folder / "a_truth.txt")->size(), 30u);
   EXPECT_EQ(read_trajectory(folder / "a.txt")->size(), stats.at("tracked").get<std::size_t>());
   EXPECT_EQ(posectl({"eval", folder / "a_truth.txt", folder / "a.txt"}).exit_code, kExitOk);
+}
+
+TEST(PosectlReplay, ComparesMasksAndDrawsThem) {
+  const TemporaryFolder folder;
+  const std::string recording = folder / "recording";
+  ASSERT_EQ(posectl({"synth", "--out", recording, "--frames", "15", "--size", "320x240", "--people", "2", "--quiet"}).exit_code,
+            kExitOk);
+  const std::vector<std::string> replay{"replay",  "--sequence", recording,           "--camera",     recording + "/camera.toml",
+                                        "--quiet", "--draw",     folder / "pictures", "--mask-truth", recording + "/mask"};
+  EXPECT_EQ(posectl(replay).exit_code, kExitUsage) << "only in lockstep";
+  std::vector<std::string> lockstep = replay;
+  lockstep.push_back("--lockstep");
+  const Outcome outcome = posectl(lockstep);
+  EXPECT_EQ(outcome.exit_code, kExitOk) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("IoU"));
+  EXPECT_FALSE(std::filesystem::is_empty(folder / "pictures"));
+}
+
+TEST(PosectlBench, ComparesTheModesOnEverySequence) {
+  const TemporaryFolder folder;
+  const std::string recording = folder / "fr1_room";
+  ASSERT_EQ(posectl({"synth", "--out", recording, "--frames", "15", "--size", "320x240", "--people", "0", "--quiet"}).exit_code,
+            kExitOk);
+  const std::string root = std::filesystem::path(recording).parent_path();
+  const Outcome outcome =
+      posectl({"bench", "tum", "--root", root, "--camera", recording + "/camera.toml", "--csv", folder / "table.csv", "--quiet"});
+  EXPECT_EQ(outcome.exit_code, kExitOk) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("| fr1_room | off | 100.0 % |"));
+  EXPECT_THAT(outcome.out, HasSubstr("| fr1_room | full | 100.0 % |"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "table.csv"));
+}
+
+TEST(PosectlBench, SaysWhatIsMissing) {
+  const TemporaryFolder folder;
+  const Outcome nothing = posectl({"bench", "tum", "--root", std::filesystem::path(folder / "x").parent_path()});
+  EXPECT_EQ(nothing.exit_code, kExitNoInput);
+  EXPECT_THAT(nothing.err, HasSubstr("rgb.txt"));
 }
 
 TEST(PosectlSynth, WritesARecordingThatCanBeReplayed) {
