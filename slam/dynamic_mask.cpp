@@ -29,6 +29,7 @@ constexpr float kAnyMoved = 0.05F;          // share of cells that have moved, w
 constexpr std::size_t kLeastCells = 6;      // of a mover
 constexpr int kMovedAround = 3;             // moved or masked neighbours without which a moved cell is taken for noise
 constexpr int kMovedReach = 10;             // [cells] from what has moved, over connected surface that may have
+constexpr int kTrimReach = 4;               // [cells] around a person's core, that stay theirs at a new detection
 constexpr int kStillStep = 2;               // [cells] that a cell counts for which was there a moment ago
 constexpr TimeNs kRecallNs = kNsPerSecond;  // a frame further back is not carried from
 
@@ -73,7 +74,10 @@ void DynamicMask::begin(const RgbdFrame& frame, const Se3& T_odom_camera, const 
     const Entry& before = history_[(taken_ - 2) % kHistory];
     const double elapsed_s = to_seconds(now.stamp_ns - before.stamp_ns);
     const int reach = std::clamp(1 + static_cast<int>(std::lround(elapsed_s / kReachPeriod_s)), 1, kMostReach);
-    carrier_.carry(before.depth, before.labels, T_odom_camera.inverse() * before.T_odom_camera, reach, now.depth, now.labels);
+    for (std::size_t i = 0; i < movers_.size(); ++i) {
+      reach_[i + 1] = movers_[i].person || movers_[i].moving ? static_cast<std::uint8_t>(reach) : std::uint8_t{0};
+    }
+    carrier_.carry(before.depth, before.labels, T_odom_camera.inverse() * before.T_odom_camera, reach_, now.depth, now.labels);
   }
   summary_ = Summary{};
   const bool has_news = newest_detections != nullptr && newest_detections->image_width > 0;
@@ -137,10 +141,11 @@ void DynamicMask::take_in(const Detections& detections) {
 
 /// Moves `carried_` from an earlier frame through those after it.
 void DynamicMask::carry_to_present(std::size_t frames_back) {
+  reach_.fill(1);
   for (std::size_t back = frames_back; back > 0; --back) {
     const Entry& from = history_[(taken_ - 1 - back) % kHistory];
     const Entry& to = history_[(taken_ - back) % kHistory];
-    carrier_.carry(from.depth, carried_, to.T_odom_camera.inverse() * from.T_odom_camera, 1, to.depth, carried_2_);
+    carrier_.carry(from.depth, carried_, to.T_odom_camera.inverse() * from.T_odom_camera, reach_, to.depth, carried_2_);
     std::swap(carried_, carried_2_);
   }
 }
@@ -179,6 +184,36 @@ void DynamicMask::meet(float score) {
     }
     if (carried_[cell] != 0 && (now.labels[cell] == 0 || mover_of(now.labels[cell]) == id)) {
       now.labels[cell] = static_cast<std::uint8_t>(id | (carried_[cell] & kPersonCore));
+    }
+  }
+  trim(id);
+}
+
+/// Each frame a mover may grow a little; what that has added up to ends not far from where the detection puts the person.
+void DynamicMask::trim(std::uint8_t id) {
+  Entry& now = newest();
+  std::fill(carried_.begin(), carried_.end(), std::uint8_t{0});  // here: whether the cell stays
+  cells_.clear();
+  for (std::size_t cell = 0; cell < now.labels.size(); ++cell) {
+    if (now.labels[cell] == (id | kPersonCore)) {
+      carried_[cell] = 1;
+      cells_.push_back(static_cast<std::uint32_t>(cell));
+    }
+  }
+  std::size_t next = 0;
+  for (int step = 0; step < kTrimReach; ++step) {
+    for (const std::size_t end = cells_.size(); next < end; ++next) {
+      now.depth.for_each_beside(cells_[next], [&](std::size_t to) {
+        if (carried_[to] == 0 && now.labels[to] == id) {
+          carried_[to] = 1;
+          cells_.push_back(static_cast<std::uint32_t>(to));
+        }
+      });
+    }
+  }
+  for (std::size_t cell = 0; cell < now.labels.size(); ++cell) {
+    if (now.labels[cell] == id && carried_[cell] == 0) {
+      now.labels[cell] = 0;
     }
   }
 }
@@ -236,7 +271,8 @@ void DynamicMask::prune(Entry& now) {
     count.moved += evidence_[cell] == CellEvidence::Moved ? 1 : 0;
     const bool was_there = evidence_[cell] == CellEvidence::Static || evidence_[cell] == CellEvidence::Still;
     count.was_there += was_there ? 1 : 0;
-    if (was_there && (!movers_[mover_of(label) - 1U].person || (label & kPersonCore) == 0)) {
+    const bool person = movers_[mover_of(label) - 1U].person;
+    if ((was_there && (!person || (label & kPersonCore) == 0)) || (evidence_[cell] == CellEvidence::Resting && !person)) {
       label = 0;
     }
   }
@@ -244,7 +280,8 @@ void DynamicMask::prune(Entry& now) {
     Mover& mover = movers_[i];
     const Count& count = counts[i + 1];
     const auto share = [&](std::size_t part) { return static_cast<float>(part) > static_cast<float>(count.cells) * kAnyMoved; };
-    if (mover.alive && count.moved >= kLeastCells && share(count.moved)) {
+    mover.moving = count.moved >= kLeastCells && share(count.moved);
+    if (mover.alive && mover.moving) {
       mover.confirmed_ns = now.stamp_ns;
       mover.masked = true;
     } else if (mover.person) {
@@ -285,7 +322,7 @@ bool DynamicMask::add_moved(Entry& now) {
           met = met == 0 ? mover_of(now.labels[to]) : met;
           return;
         }
-        if (carried_[to] != 0 || evidence_[to] == CellEvidence::Static) {
+        if (carried_[to] != 0 || evidence_[to] == CellEvidence::Static || evidence_[to] == CellEvidence::Resting) {
           return;
         }
         const bool seeds = is_moved(to);
@@ -305,6 +342,7 @@ bool DynamicMask::add_moved(Entry& now) {
       continue;
     }
     movers_[id - 1U].confirmed_ns = now.stamp_ns;
+    movers_[id - 1U].moving = true;
     for (const std::uint32_t cell : cells_) {
       now.labels[cell] = id;
     }

@@ -76,6 +76,7 @@ class DynamicMask {
     bool sure = false;              // it was sure once
     std::int64_t confirmed_ns = 0;  // by a detection, or by its motion
     bool masked = true;             // false: taken for a false detection, as long as nothing else speaks for it
+    bool moving = true;             // its motion showed in the last frame
   };
   struct Entry {
     explicit Entry(int width, int height) : depth(width, height), labels(depth.size(), 0) {}
@@ -93,6 +94,7 @@ class DynamicMask {
   void take_in(const Detections& detections);
   void carry_to_present(std::size_t frames_back);
   void meet(float score);
+  void trim(std::uint8_t id);
   std::uint8_t new_mover();
   void prune(Entry& now);
   bool add_moved(Entry& now);
@@ -115,6 +117,7 @@ class DynamicMask {
   std::vector<std::uint8_t> carried_;  // one detection on its way to the present
   std::vector<std::uint8_t> carried_2_;
   std::vector<std::uint32_t> cells_;
+  MoverReach reach_{};
   std::vector<std::uint8_t> masked_;
   std::vector<std::uint8_t> interior_;
   Summary summary_;

@@ -15,7 +15,7 @@ constexpr float kLocalMapRadius = 5.0F;  // [pixels on level 0] around the local
 FrameLocalizer::FrameLocalizer(const PinholeCamera& camera, const TrackerConfig& config, std::size_t landmark_capacity)
     : camera_(camera), noise_(config, camera.intrinsics()), matcher_(camera, config) {
   const std::size_t features = feature_capacity(config.features);
-  landmark_of_.reserve(features);
+  result_.landmark_of.reserve(features);
   observations_.reserve(features);
   observed_keypoint_.reserve(features);
   projected_.reserve(landmark_capacity);
@@ -23,15 +23,15 @@ FrameLocalizer::FrameLocalizer(const PinholeCamera& camera, const TrackerConfig&
 }
 
 void FrameLocalizer::reset(const FeatureFrame& frame) {
-  landmark_of_.assign(frame.size(), kUnmatched);
-  matches_ = 0;
-  solution_ = PoseSolution{};
+  result_.landmark_of.assign(frame.size(), kUnmatched);
+  result_.matches = 0;
+  result_.solution = PoseSolution{};
 }
 
 void FrameLocalizer::begin_at(const FeatureFrame& frame, const Se3& T_map_camera) {
   reset(frame);
-  solution_.T_map_camera = T_map_camera;
-  solution_.solved = true;
+  result_.solution.T_map_camera = T_map_camera;
+  result_.solution.solved = true;
 }
 
 void FrameLocalizer::match(const MapSnapshot& map, const FeatureFrame& frame, std::span<const LandmarkId> wanted,
@@ -45,51 +45,51 @@ void FrameLocalizer::match(const MapSnapshot& map, const FeatureFrame& frame, st
     return wanted.empty() || (next < wanted.size() && wanted[next] == map.landmarks[l].id);
   };
   matcher_.project_where(map, T_map_camera, frame, is_wanted, projected_);
-  landmark_of_.assign(frame.size(), kUnmatched);
+  result_.landmark_of.assign(frame.size(), kUnmatched);
   MatchOptions options;
   options.radius = radius;
-  matches_ = matcher_.match(map, projected_, frame, options, landmark_of_);
+  result_.matches = matcher_.match(map, projected_, frame, options, result_.landmark_of);
 }
 
 bool FrameLocalizer::solve(const MapSnapshot& map, const FeatureFrame& frame, const Se3& initial) {
   const TimeNs begin_ns = SystemClock::instance().now_ns();
   observations_.clear();
   observed_keypoint_.clear();
-  for (std::size_t i = 0; i < landmark_of_.size(); ++i) {
-    if (landmark_of_[i] == kUnmatched) {
+  for (std::size_t i = 0; i < result_.landmark_of.size(); ++i) {
+    if (result_.landmark_of[i] == kUnmatched) {
       continue;
     }
     const int level = frame.features().keypoints[i].level;
     const double z = frame.depth_m()[i];
     const double trust = frame.trust()[i];
-    observations_.push_back({map.landmarks[static_cast<std::size_t>(landmark_of_[i])].p_map.cast<double>(),
+    observations_.push_back({map.landmarks[static_cast<std::size_t>(result_.landmark_of[i])].p_map.cast<double>(),
                              frame.ideal_pixels()[i].cast<double>(), frame.disparity()[i], trust * noise_.pixel_weight(level),
                              z > 0 ? trust * noise_.disparity_weight(level, z) : 0.0, true});
     observed_keypoint_.push_back(static_cast<std::uint16_t>(i));
   }
-  solution_ = solve_pose(camera_, initial, observations_);
+  result_.solution = solve_pose(camera_, initial, observations_);
   for (std::size_t j = 0; j < observations_.size(); ++j) {
     if (!observations_[j].inlier) {
-      landmark_of_[observed_keypoint_[j]] = kUnmatched;
+      result_.landmark_of[observed_keypoint_[j]] = kUnmatched;
     }
   }
   solve_ns_ += SystemClock::instance().now_ns() - begin_ns;
-  return solution_.solved;
+  return result_.solution.solved;
 }
 
 bool FrameLocalizer::refine(const MapSnapshot& map, const FeatureFrame& frame, int min_inliers) {
   landmark_taken_.assign(map.landmarks.size(), 0);
-  for (const std::int32_t landmark : landmark_of_) {
+  for (const std::int32_t landmark : result_.landmark_of) {
     if (landmark != kUnmatched) {
       landmark_taken_[static_cast<std::size_t>(landmark)] = 1;
     }
   }
   const auto is_free = [&](std::uint32_t l) { return landmark_taken_[l] == 0; };
-  matcher_.project_where(map, solution_.T_map_camera, frame, is_free, projected_);
+  matcher_.project_where(map, result_.solution.T_map_camera, frame, is_free, projected_);
   MatchOptions options;
   options.radius = kLocalMapRadius;
-  matches_ += matcher_.match(map, projected_, frame, options, landmark_of_);
-  return solve(map, frame, solution_.T_map_camera) && solution_.inliers >= min_inliers;
+  result_.matches += matcher_.match(map, projected_, frame, options, result_.landmark_of);
+  return solve(map, frame, result_.solution.T_map_camera) && result_.solution.inliers >= min_inliers;
 }
 
 TimeNs FrameLocalizer::take_solve_ns() {

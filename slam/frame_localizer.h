@@ -16,6 +16,13 @@ namespace posed {
 /// step to step. Does not allocate once warm. One object a thread.
 class FrameLocalizer {
  public:
+  /// Matches and the solution from them, to be gone back to.
+  struct Result {
+    std::vector<std::int32_t> landmark_of;  ///< by keypoint: index into the map, or kUnmatched
+    int matches = 0;                        ///< before outliers were rejected
+    PoseSolution solution;
+  };
+
   FrameLocalizer(const PinholeCamera& camera, const TrackerConfig& config, std::size_t landmark_capacity);
 
   /// No match, no solution.
@@ -35,9 +42,9 @@ class FrameLocalizer {
   template <typename Leaves>
   int drop_where(Leaves&& leaves) {
     int dropped = 0;
-    for (std::size_t i = 0; i < landmark_of_.size(); ++i) {
-      if (landmark_of_[i] != kUnmatched && leaves(i)) {
-        landmark_of_[i] = kUnmatched;
+    for (std::size_t i = 0; i < result_.landmark_of.size(); ++i) {
+      if (result_.landmark_of[i] != kUnmatched && leaves(i)) {
+        result_.landmark_of[i] = kUnmatched;
         ++dropped;
       }
     }
@@ -48,18 +55,18 @@ class FrameLocalizer {
   /// `min_inliers` agree.
   bool refine(const MapSnapshot& map, const FeatureFrame& frame, int min_inliers);
 
-  const PoseSolution& solution() const { return solution_; }
-  const std::vector<std::int32_t>& landmark_of() const { return landmark_of_; }  ///< by keypoint: index into the map, or kUnmatched
-  int matches() const { return matches_; }                                       ///< before outliers were rejected
-  TimeNs take_solve_ns();                                                        ///< spent solving since the last call
+  const Result& result() const { return result_; }
+  const PoseSolution& solution() const { return result_.solution; }
+  const std::vector<std::int32_t>& landmark_of() const { return result_.landmark_of; }
+  int matches() const { return result_.matches; }
+  void restore(const Result& result) { result_ = result; }  ///< an earlier one of the same frame
+  TimeNs take_solve_ns();                                   ///< spent solving since the last call
 
  private:
   PinholeCamera camera_;
   MeasurementNoise noise_;
   ProjectionMatcher matcher_;
-  std::vector<std::int32_t> landmark_of_;
-  int matches_ = 0;
-  PoseSolution solution_;
+  Result result_;
   TimeNs solve_ns_ = 0;
   std::vector<ProjectedLandmark> projected_;
   std::vector<PoseObservation> observations_;

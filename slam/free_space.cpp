@@ -50,6 +50,7 @@ void FreeSpace::compare(const DepthGrid& now, const Reference& reference, const 
     int valid = 0;
     bool free = true;
     bool met = false;
+    bool met_mover = false;
     const auto look = [&](std::size_t c) {
       const float z = reference.depth[c];
       if (z <= 0) {
@@ -57,7 +58,9 @@ void FreeSpace::compare(const DepthGrid& now, const Reference& reference, const 
       }
       ++valid;
       free = free && z > p.z() + tolerance;
-      met = met || (std::abs(z - p.z()) < tolerance && reference.is_mover[c] == 0);
+      const bool here = std::abs(z - p.z()) < tolerance;
+      met = met || (here && reference.is_mover[c] == 0);
+      met_mover = met_mover || (here && reference.is_mover[c] != 0);
     };
     look(middle);
     now.for_each_around(middle, look);
@@ -65,6 +68,8 @@ void FreeSpace::compare(const DepthGrid& now, const Reference& reference, const 
       evidence[cell] = CellEvidence::Moved;
     } else if (met) {
       evidence[cell] = std::max(evidence[cell], if_met);
+    } else if (met_mover && if_met == CellEvidence::Static) {
+      evidence[cell] = std::max(evidence[cell], CellEvidence::Resting);
     }
   }
 }

@@ -15,6 +15,7 @@ namespace posed {
 /// What the past says of the surface that a cell shows.
 enum class CellEvidence : std::uint8_t {
   Unknown,  ///< nothing: it was hidden, out of view, or there is no depth
+  Resting,  ///< it was there a while ago, taken for a mover already then
   Still,    ///< it was there a moment ago
   Static,   ///< it was there a while ago
   Moved,    ///< an earlier frame saw through the place where it is now
@@ -42,7 +43,10 @@ class FreeSpace {
   void remember(const DepthGrid& now, std::span<const std::uint8_t> is_mover, const Se3& T_odom_camera, std::int64_t stamp_ns);
 
   /// After a loss of the camera: earlier poses have no bearing on later ones.
-  void forget() { count_ = 0; }
+  void forget() {
+    next_ = 0;
+    count_ = 0;
+  }
 
  private:
   struct Reference {
@@ -58,7 +62,7 @@ class FreeSpace {
 
   GridCamera camera_;
   std::vector<Reference> references_;
-  std::size_t next_ = 0;
+  std::size_t next_ = 0;  // of the first `count_` references, unless all are in use
   std::size_t count_ = 0;
 };
 

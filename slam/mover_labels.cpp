@@ -14,8 +14,8 @@ MoverCarrier::MoverCarrier(const PinholeCamera& camera) : camera_(camera) {
   next_front_.reserve(grid.size());
 }
 
-void MoverCarrier::carry(const DepthGrid& from, std::span<const std::uint8_t> labels_from, const Se3& T_to_from, int reach,
-                         const DepthGrid& to, std::span<std::uint8_t> labels_to) {
+void MoverCarrier::carry(const DepthGrid& from, std::span<const std::uint8_t> labels_from, const Se3& T_to_from,
+                         const MoverReach& reach, const DepthGrid& to, std::span<std::uint8_t> labels_to) {
   std::fill(labels_to.begin(), labels_to.end(), std::uint8_t{0});
   const Eigen::Matrix3f R = T_to_from.rotation_matrix().cast<float>();
   const Eigen::Vector3f t = T_to_from.translation().cast<float>();
@@ -54,16 +54,20 @@ void MoverCarrier::close_seams(const DepthGrid& to, std::span<std::uint8_t> labe
   }
 }
 
-void MoverCarrier::grow(const DepthGrid& to, int reach, std::span<std::uint8_t> labels_to) {
+void MoverCarrier::grow(const DepthGrid& to, const MoverReach& reach, std::span<std::uint8_t> labels_to) {
   front_.clear();
   for (std::size_t cell = 0; cell < labels_to.size(); ++cell) {
     if (labels_to[cell] != 0) {
       front_.push_back(static_cast<std::uint32_t>(cell));
     }
   }
-  for (int step = 0; step < reach; ++step) {
+  const int most = *std::max_element(reach.begin(), reach.end());
+  for (int step = 0; step < most; ++step) {
     next_front_.clear();
     for (const std::uint32_t cell : front_) {
+      if (step >= reach[mover_of(labels_to[cell])]) {
+        continue;
+      }
       to.for_each_beside(cell, [&](std::size_t beside) {
         if (labels_to[beside] == 0 && is_one_surface(to[cell], to[beside])) {
           labels_to[beside] = mover_of(labels_to[cell]);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -19,19 +20,22 @@ constexpr std::uint8_t mover_of(std::uint8_t label) {
   return label & kMoverMask;
 }
 
+/// For each mover, at its number, by how many cells its edge may move from one frame to the next.
+using MoverReach = std::array<std::uint8_t, kMostMovers + 1>;
+
 /// Moves labels from one frame to a later one. Allocates at construction only. Thread-bound.
 class MoverCarrier {
  public:
   explicit MoverCarrier(const PinholeCamera& camera);
 
   /// Replaces `labels_to`. A labelled cell's surface is expected where the camera's motion puts it; the labels found there grow
-  /// over connected surface by `reach` cells, for the mover's own motion, and fill holes in the depth.
-  void carry(const DepthGrid& from, std::span<const std::uint8_t> labels_from, const Se3& T_to_from, int reach, const DepthGrid& to,
-             std::span<std::uint8_t> labels_to);
+  /// over connected surface by `reach`, for the mover's own motion, and fill holes in the depth.
+  void carry(const DepthGrid& from, std::span<const std::uint8_t> labels_from, const Se3& T_to_from, const MoverReach& reach,
+             const DepthGrid& to, std::span<std::uint8_t> labels_to);
 
  private:
   void close_seams(const DepthGrid& to, std::span<std::uint8_t> labels_to);
-  void grow(const DepthGrid& to, int reach, std::span<std::uint8_t> labels_to);
+  void grow(const DepthGrid& to, const MoverReach& reach, std::span<std::uint8_t> labels_to);
 
   GridCamera camera_;
   std::vector<std::uint32_t> front_;

@@ -69,7 +69,7 @@ struct Tracker::Impl {
   OrbExtractor extractor;
   std::optional<DynamicMask> mask;
   FrameLocalizer localizer;
-  FrameLocalizer spare;  // what to go back to; here to keep its memory
+  FrameLocalizer::Result spare;  // what to go back to; here to keep its memory
   KeyframeRecovery recovery;
   MotionModel motion;
   Se3 T_map_start;
@@ -109,10 +109,10 @@ Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, co
       camera(intrinsics),
       extractor(tracker, intrinsics.width, intrinsics.height),
       localizer(camera, tracker, static_cast<std::size_t>(mapper.local_landmarks)),
-      spare(localizer),
       recovery(camera, tracker),
       T_map_start(T_map_camera_start),
       frame(camera, feature_capacity(tracker.features)) {
+  spare.landmark_of.reserve(feature_capacity(config.features));
   last_landmarks.reserve(feature_capacity(config.features));
   anchors.reserve(feature_capacity(config.features));
   if (dynamic.mode != DynamicMode::Off) {
@@ -148,14 +148,14 @@ void Tracker::Impl::leave_movers_out(const MapSnapshot& map) {
   if (!mask->settle(T_map_odom.inverse() * localizer.solution().T_map_camera) || starts_map || wary) {
     return;
   }
-  spare = localizer;
+  spare = localizer.result();
   const auto is_mover = [this](std::size_t i) {
     const Keypoint& k = frame.features().keypoints[i];
     return mask->is_mover(k.x, k.y, frame.depth_m()[i]);
   };
   if (localizer.drop_where(is_mover) > 0 &&
-      !(localizer.solve(map, frame, spare.solution().T_map_camera) && localizer.solution().inliers >= config.min_inliers)) {
-    localizer = spare;
+      !(localizer.solve(map, frame, spare.solution.T_map_camera) && localizer.solution().inliers >= config.min_inliers)) {
+    localizer.restore(spare);
   }
 }
 

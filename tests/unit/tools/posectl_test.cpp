@@ -175,7 +175,7 @@ TEST(PosectlReplay, ComparesMasksAndDrawsThem) {
   ASSERT_EQ(posectl({"synth", "--out", recording, "--frames", "15", "--size", "320x240", "--people", "2", "--quiet"}).exit_code,
             kExitOk);
   const std::vector<std::string> replay{"replay",  "--sequence", recording,           "--camera",     recording + "/camera.toml",
-                                        "--quiet", "--draw",     folder / "pictures", "--mask-truth", recording + "/mask"};
+                                        "--quiet", "--draw",     folder / "pictures", "--mask-truth", recording + "/masks"};
   EXPECT_EQ(posectl(replay).exit_code, kExitUsage) << "only in lockstep";
   std::vector<std::string> lockstep = replay;
   lockstep.push_back("--lockstep");
