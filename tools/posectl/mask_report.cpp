@@ -17,6 +17,16 @@ std::string stamp_name(std::int64_t stamp_ns) {
   return fmt::format("{}.{:06d}", stamp_ns / kNsPerSecond, stamp_ns % kNsPerSecond / kNsPerUs);
 }
 
+/// Recordings name their images by stamps to the microsecond or to the nanosecond.
+std::filesystem::path mask_path(const std::filesystem::path& folder, std::int64_t stamp_ns) {
+  std::filesystem::path path = folder / (stamp_name(stamp_ns) + ".png");
+  if (std::error_code ignored; !std::filesystem::exists(path, ignored)) {
+    const auto precise = folder / fmt::format("{}.{:09d}.png", stamp_ns / kNsPerSecond, stamp_ns % kNsPerSecond);
+    return std::filesystem::exists(precise, ignored) ? precise : path;
+  }
+  return path;
+}
+
 double share(std::uint64_t part, std::uint64_t rest) {
   return part + rest > 0 ? static_cast<double>(part) / static_cast<double>(part + rest) : 0.0;
 }
@@ -91,7 +101,7 @@ Status MaskReport::draw(const TrackedView& view) {
 }
 
 Status MaskReport::compare(const TrackedView& view) {
-  const std::filesystem::path path = options_.truth / (stamp_name(view.frame.stamp_utc_ns) + ".png");
+  const std::filesystem::path path = mask_path(options_.truth, view.frame.stamp_utc_ns);
   if (Status read = truth_.read(path); !read) {
     return read;
   }

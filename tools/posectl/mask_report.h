@@ -31,7 +31,7 @@ class MaskReport {
   struct Options {
     std::filesystem::path draw;   ///< folder for pictures: movers tinted, kept features dotted; empty: none
     int draw_every = 15;          ///< frames
-    std::filesystem::path truth;  ///< folder of STAMP.png, not 0 where something moves; empty: none
+    std::filesystem::path truth;  ///< folder of STAMP.png (to 6 or 9 decimals), not 0 where something moves; empty: none
   };
 
   MaskReport(Options options, const Config& config);
