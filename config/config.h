@@ -58,7 +58,7 @@ struct TrackerConfig {
   double close_depth_m = 3.0;           ///< depth up to which a keyframe turns keypoints into landmarks at once
   int min_inliers = 30;                 ///< fewer: the pose is not trusted, the state becomes lost
   int keyframe_max_interval = 30;       ///< frames
-  double keyframe_inlier_ratio = 0.75;  ///< of the reference keyframe's landmarks; fewer seen asks for a keyframe
+  double keyframe_inlier_ratio = 0.85;  ///< of the reference keyframe's landmarks; fewer seen asks for a keyframe
   double new_map_after_s = 5.0;         ///< lost for so long, a new map is begun
 };
 
@@ -66,9 +66,9 @@ struct MapperConfig {
   int max_keyframes = 1000;      ///< kept, of all maps
   int max_landmarks = 200'000;   ///< kept, of all maps
   int local_landmarks = 8000;    ///< in the snapshot the tracker sees
-  int local_keyframes = 25;      ///< whose landmarks make the local map
+  int local_keyframes = 35;      ///< whose landmarks make the local map
   int recovery_keyframes = 20;   ///< of the local map, to match against when lost
-  int bundle_keyframes = 20;     ///< moved by a local bundle adjustment; 0: none is made
+  int bundle_keyframes = 30;     ///< moved by a local bundle adjustment; 0: none is made
   int bundle_iterations = 5;     ///< a round, of two
   double bundle_budget_s = 0.2;  ///< after which a local bundle adjustment is given up (not in lockstep)
   bool loop_closing = true;      ///< look for places seen before

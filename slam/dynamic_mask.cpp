@@ -25,6 +25,7 @@ constexpr float kLeastScore = 0.5F;
 constexpr float kSureStrength = 1.5F;
 constexpr double kSureMemory = 2.0;         // times the memory of others
 constexpr float kAllStatic = 0.7F;          // share of a person's cells that were there before, which makes them doubtful
+constexpr float kMuchMoved = 0.2F;          // share of a person's cells that have moved, which says that they walk
 constexpr float kAnyMoved = 0.05F;          // share of cells that have moved, which confirms a mover
 constexpr std::size_t kLeastCells = 6;      // of a mover
 constexpr int kMovedAround = 3;             // moved or masked neighbours without which a moved cell is taken for noise
@@ -253,34 +254,53 @@ void DynamicMask::settle_lost() {
   }
 }
 
-/// What was there before is no mover's, unless a detector says so.
+/// What was there before is no mover's, unless a detector says so. Even then, where a person walks: of their core the lesser part
+/// that was there before is the desk they pass.
 void DynamicMask::prune(Entry& now) {
   struct Count {
     std::size_t cells = 0;
     std::size_t moved = 0;
     std::size_t was_there = 0;
+    std::size_t core = 0;
+    std::size_t rested_core = 0;
+    std::size_t needed(float share) const {
+      return std::max(kLeastCells, static_cast<std::size_t>(share * static_cast<float>(cells)));
+    }
+    bool walks() const { return moved > needed(kMuchMoved); }
+  };
+  const auto rested = [&](std::size_t cell) {
+    return evidence_[cell] == CellEvidence::Static || evidence_[cell] == CellEvidence::Resting;
   };
   std::array<Count, kMostMovers + 1> counts{};
+  for (std::size_t cell = 0; cell < now.labels.size(); ++cell) {
+    const std::uint8_t label = now.labels[cell];
+    const bool core = (label & kPersonCore) != 0;
+    Count& count = counts[mover_of(label)];
+    ++count.cells;
+    count.moved += evidence_[cell] == CellEvidence::Moved ? 1 : 0;
+    count.was_there += evidence_[cell] == CellEvidence::Static || evidence_[cell] == CellEvidence::Still ? 1 : 0;
+    count.core += core ? 1 : 0;
+    count.rested_core += core && rested(cell) ? 1 : 0;
+  }
   for (std::size_t cell = 0; cell < now.labels.size(); ++cell) {
     std::uint8_t& label = now.labels[cell];
     if (label == 0) {
       continue;
     }
-    Count& count = counts[mover_of(label)];
-    ++count.cells;
-    count.moved += evidence_[cell] == CellEvidence::Moved ? 1 : 0;
-    const bool was_there = evidence_[cell] == CellEvidence::Static || evidence_[cell] == CellEvidence::Still;
-    count.was_there += was_there ? 1 : 0;
+    const Count& count = counts[mover_of(label)];
     const bool person = movers_[mover_of(label) - 1U].person;
-    if ((was_there && (!person || (label & kPersonCore) == 0)) || (evidence_[cell] == CellEvidence::Resting && !person)) {
-      label = 0;
+    bool leaves = rested(cell) && (!person || count.walks());
+    if ((label & kPersonCore) != 0) {
+      leaves = leaves && evidence_[cell] == CellEvidence::Static && 2 * count.rested_core < count.core;
+    } else {
+      leaves = leaves || evidence_[cell] == CellEvidence::Static || evidence_[cell] == CellEvidence::Still;
     }
+    label = leaves ? std::uint8_t{0} : label;
   }
   for (std::size_t i = 0; i < movers_.size(); ++i) {
     Mover& mover = movers_[i];
     const Count& count = counts[i + 1];
-    const auto share = [&](std::size_t part) { return static_cast<float>(part) > static_cast<float>(count.cells) * kAnyMoved; };
-    mover.moving = count.moved >= kLeastCells && share(count.moved);
+    mover.moving = count.moved >= count.needed(kAnyMoved);
     if (mover.alive && mover.moving) {
       mover.confirmed_ns = now.stamp_ns;
       mover.masked = true;
