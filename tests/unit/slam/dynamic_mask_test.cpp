@@ -55,6 +55,15 @@ class Scene {
     mask_.settle(Se3());
   }
 
+  /// The same where the camera's pose is not found.
+  void show_lost() {
+    frame_.sequence = next_;
+    frame_.stamp_utc_ns = static_cast<std::int64_t>(next_ + 1) * kPeriod_ns;
+    ++next_;
+    mask_.begin(frame_, Se3(), nullptr);
+    mask_.settle_lost();
+  }
+
   /// What a detector says of the frame shown `frames_back` ago.
   Detections detected(const Rectangle& person, float score, std::uint64_t frames_back = 0) const {
     Detections found;
@@ -217,6 +226,36 @@ TEST(DynamicMaskTest, WhoSitsStillStaysMaskedAsLongAsTheDetectorSeesThem) {
     scene.show(&found);
   }
   EXPECT_GT(scene.masked_share(kBody), 0.95);
+}
+
+TEST(DynamicMaskTest, WhatWasSeenBeforeALossSaysNothingAfterIt) {
+  Scene scene;
+  for (int i = 0; i < 40; ++i) {
+    scene.wall().show();
+  }
+  scene.show_lost();
+  for (int i = 0; i < 40; ++i) {
+    scene.wall().put({0, 0, kWidth, kHeight}, kBody_m).show();
+    ASSERT_EQ(scene.mask().summary().masked_share, 0) << "another place, frame " << i;
+  }
+}
+
+TEST(DynamicMaskTest, TheDeskThatAWalkerPassesIsKept) {
+  constexpr Rectangle kDesk{0, 400, kWidth, kHeight};
+  Scene scene;
+  for (int i = 0; i < 40; ++i) {
+    scene.wall().put(kDesk, kBody_m).show();
+  }
+  for (int i = 0; i < 40; ++i) {
+    const Rectangle body = kBody.moved(6 * i - 100);
+    scene.wall().put(kDesk, kBody_m).put(body, kBody_m);
+    const Detections found = scene.detected({body.x0 - 80, body.y0, body.x1 + 80, body.y1}, 0.8F);
+    scene.show(&found);
+    if (i > 5) {
+      EXPECT_LT(scene.masked_share(body, true), 0.01) << i;
+      EXPECT_GT(scene.masked_share({body.x0, body.y0, body.x1, kDesk.y0}), 0.9) << i;
+    }
+  }
 }
 
 TEST(DynamicMaskTest, OneUnsureDetectionDoesNotStandAgainstAppearance) {
