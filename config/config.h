@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "config/camera_source_config.h"
 #include "config/detector_config.h"
 #include "config/dynamic_config.h"
 #include "core/pinhole_camera.h"
@@ -12,7 +13,7 @@
 /// The daemon's configuration as typed values: units in the names, defaults here, ranges and descriptions in config_schema.cpp.
 namespace posed {
 
-enum class SourceKind { Synthetic, Replay };
+enum class SourceKind { Synthetic, Replay, OpenNi2, V4l2, Libcamera };
 enum class Pacing { Realtime, Lockstep };
 enum class SyntheticMode { Sitting, Walking };
 enum class SyntheticWorldKind { Room, Corridor, Office, TwinRooms };
@@ -40,6 +41,11 @@ struct SourceConfig {
   Pacing pacing = Pacing::Realtime;
   ReplayConfig replay;
   SyntheticConfig synthetic;
+  LiveConfig live;
+  OpenNi2Config openni2;
+  V4l2Config v4l2;
+  LibcameraConfig libcamera;
+  DepthNodeConfig depth;
 };
 
 struct CameraConfig {
@@ -128,6 +134,7 @@ struct Config {
   DetectorConfig detector;
   DynamicConfig dynamic;
   PublisherConfig publisher;
+  GpioConfig gpio;
   PipelineConfig pipeline;
   LoggingConfig logging;
 

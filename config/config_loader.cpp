@@ -14,10 +14,38 @@ namespace posed {
 
 namespace {
 
+bool is_recording(const SourceConfig& source) {
+  constexpr std::string_view kOni = ".oni";
+  return source.kind == SourceKind::OpenNi2 && source.openni2.device.ends_with(kOni);
+}
+
+bool is_camera(const SourceConfig& source) {
+  return source.kind != SourceKind::Replay && source.kind != SourceKind::Synthetic && !is_recording(source);
+}
+
+void check_cameras(StrictReader& reader, const SourceConfig& source) {
+  const bool without_depth = source.kind == SourceKind::V4l2 || source.kind == SourceKind::Libcamera;
+  reader.require(source.kind != SourceKind::V4l2 || !source.v4l2.device.empty(), {"source.kind", "source.v4l2.device"},
+                 "needs source.v4l2.device, the node of the colour camera");
+  reader.require(!without_depth || !source.depth.node.device.empty(), {"source.kind", "source.depth.device"},
+                 "a colour camera alone cannot be tracked in metres: set source.depth.device, the node of a depth camera");
+  reader.require(source.pacing != Pacing::Lockstep || !is_camera(source), {"source.pacing", "source.kind"},
+                 "a camera does not wait: \"lockstep\" is for recordings and the rendered world");
+}
+
+void check_gpio(StrictReader& reader, const GpioConfig& gpio) {
+  const auto differ = [](int a, int b) { return a < 0 || a != b; };
+  reader.require(differ(gpio.status_line, gpio.enable_line) && differ(gpio.status_line, gpio.trigger_line) &&
+                     differ(gpio.enable_line, gpio.trigger_line),
+                 {"gpio.status_line", "gpio.enable_line", "gpio.trigger_line"},
+                 "status_line, enable_line and trigger_line must be different lines");
+}
+
 /// Rules that tie keys together. The first key of a rule is blamed where the text has it.
 void check_rules(StrictReader& reader, const Config& c) {
   reader.require(c.source.kind != SourceKind::Replay || !c.source.replay.sequence.empty(),
                  {"source.kind", "source.replay.sequence"}, "needs source.replay.sequence, the folder of a recording");
+  check_cameras(reader, c.source);
   reader.require(
       c.source.synthetic.people == 0 || c.source.synthetic.world == SyntheticWorldKind::Room,
       {"source.synthetic.world", "source.synthetic.people"},
@@ -67,21 +95,22 @@ void resolve_path(const std::filesystem::path& folder, std::string& path) {
   }
 }
 
-/// Reads the calibration that `config` names; `folders` come before the shipped ones.
-void read_calibration(StrictReader& reader, std::vector<std::filesystem::path> folders, Config& config) {
-  const Result<std::filesystem::path> file = find_file(config.camera.calibration, std::move(folders), calibration_folders());
+/// Reads the calibration that `key` names, and makes its path whole; `folders` come before the shipped ones.
+bool read_calibration(StrictReader& reader, const std::string& key, const std::vector<std::filesystem::path>& folders,
+                      std::string& name, CameraIntrinsics& intrinsics) {
+  const Result<std::filesystem::path> file = find_file(name, folders, calibration_folders());
   if (!file) {
-    reader.require(false, {"camera.calibration"}, file.error().message);
-    return;
+    reader.require(false, {key}, file.error().message);
+    return false;
   }
-  const Result<CameraIntrinsics> intrinsics = load_camera(*file);
-  if (!intrinsics) {
-    reader.add_foreign(intrinsics.error());
-    return;
+  const Result<CameraIntrinsics> read = load_camera(*file);
+  if (!read) {
+    reader.add_foreign(read.error());
+    return false;
   }
-  config.camera.calibration = file->string();
-  config.intrinsics = *intrinsics;
-  check_pyramid(reader, config);
+  name = file->string();
+  intrinsics = *read;
+  return true;
 }
 
 /// Makes their paths ready to open; `folders` come before the shipped models' ones.
@@ -99,11 +128,13 @@ void find_models(StrictReader& reader, const std::vector<std::filesystem::path>&
   }
 }
 
-Result<Config> read_config(const std::string& text, const std::filesystem::path& name, std::vector<std::filesystem::path> folders) {
+Result<Config> read_config(const std::string& text, const std::filesystem::path& name,
+                           const std::vector<std::filesystem::path>& folders) {
   Config config;
   StrictReader reader(name, config_schema(config));
   reader.read(text);
   check_rules(reader, config);
+  check_gpio(reader, config.gpio);
   check_thread(reader, "pipeline.capture", config.pipeline.capture);
   check_thread(reader, "pipeline.tracker", config.pipeline.tracker);
   check_thread(reader, "pipeline.mapper", config.pipeline.mapper);
@@ -112,8 +143,17 @@ Result<Config> read_config(const std::string& text, const std::filesystem::path&
   resolve_path(name.parent_path(), config.source.replay.sequence);
   resolve_path(name.parent_path(), config.source.replay.associations);
   resolve_path(name.parent_path(), config.map.file);
+  if (is_recording(config.source)) {
+    resolve_path(name.parent_path(), config.source.openni2.device);
+  }
   find_models(reader, folders, config.detector);
-  read_calibration(reader, std::move(folders), config);
+  if (read_calibration(reader, "camera.calibration", folders, config.camera.calibration, config.intrinsics)) {
+    check_pyramid(reader, config);
+  }
+  DepthNodeConfig& depth = config.source.depth;
+  if (!depth.calibration.empty()) {
+    read_calibration(reader, "source.depth.calibration", folders, depth.calibration, depth.intrinsics);
+  }
   return reader.status().map([&] { return config; });
 }
 

@@ -4,45 +4,11 @@
 #include <limits>
 #include <utility>
 
+#include "config/source_schema.h"
+
 namespace posed {
 
 namespace {
-
-template <typename Enum>
-using Names = std::vector<std::pair<std::string_view, Enum>>;
-
-template <typename Enum>
-ChoiceField choice(Enum& value, Names<Enum> names) {
-  ChoiceField field;
-  for (const auto& [name, unused] : names) {
-    field.names.push_back(name);
-  }
-  field.get = [&value, names] {
-    return std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.second == value; })->first;
-  };
-  field.set = [&value, names](std::string_view text) {
-    value = std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.first == text; })->second;
-  };
-  return field;
-}
-
-ChoiceField choice(std::string& value, std::vector<std::string_view> names) {
-  return {std::move(names), [&value] { return std::string_view(value); }, [&value](std::string_view text) { value = text; }};
-}
-
-IntegerField integer(int& value, int minimum, int maximum) {
-  return {&value, minimum, maximum};
-}
-IntegerField integer(std::int64_t& value, std::int64_t minimum, std::int64_t maximum) {
-  return {&value, minimum, maximum};
-}
-RealField real(double& value, double minimum, double maximum) {
-  return {&value, minimum, maximum};
-}
-
-bool is_path(std::string_view text) {
-  return text.find('\0') == std::string_view::npos;
-}
 
 bool is_file_name(std::string_view text) {
   return !text.empty() && is_path(text);
@@ -61,73 +27,6 @@ bool is_channel_prefix(std::string_view text) {
   return text.size() <= 31 && std::all_of(text.begin(), text.end(), [](char c) {
            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
          });
-}
-
-/// Collects sections; names keys by their section.
-class SchemaBuilder {
- public:
-  SchemaBuilder& section(std::string name, std::string_view description) {
-    schema_.push_back({std::move(name), description, {}});
-    return *this;
-  }
-
-  SchemaBuilder& key(std::string_view name, Field field, std::string_view unit, std::string_view description) {
-    SchemaSection& section = schema_.back();
-    section.keys.push_back({section.name + "." + std::string(name), std::move(field), unit, description});
-    return *this;
-  }
-
-  /// The file must have the key added last.
-  SchemaBuilder& required() {
-    schema_.back().keys.back().required = true;
-    return *this;
-  }
-
-  Schema build() && { return std::move(schema_); }
-
- private:
-  Schema schema_;
-};
-
-void add_source(SchemaBuilder& schema, SourceConfig& c) {
-  schema.section("source", "Where frames come from and how fast.")
-      .key("kind", choice(c.kind, {{"synthetic", SourceKind::Synthetic}, {"replay", SourceKind::Replay}}), "",
-           "`synthetic` renders a world, such as a room with walking people; `replay` reads a recording.")
-      .key("pacing", choice(c.pacing, {{"realtime", Pacing::Realtime}, {"lockstep", Pacing::Lockstep}}), "",
-           "`realtime` delivers frames when their stamps say and drops what cannot be kept up with; `lockstep` processes every "
-           "frame, as "
-           "fast as possible, and repeats exactly.");
-  schema.section("source.replay", "A recording in the TUM RGB-D layout, for `kind = \"replay\"`.")
-      .key("sequence", TextField{&c.replay.sequence, {"the path of a folder", is_path}}, "",
-           "Folder of the recording, with rgb.txt and depth.txt. A relative path starts at this file's folder. Must be set for "
-           "`kind = \"replay\"`.")
-      .key("associations", TextField{&c.replay.associations, {"the path of a file, or \"\"", is_path}}, "",
-           "File of lines `colour-stamp colour-path depth-stamp depth-path`. A relative path starts at this file's folder. Empty: "
-           "colour and depth are paired by their stamps.")
-      .key("max_stamp_difference_s", real(c.replay.max_stamp_difference_s, 0.0, 1.0), "s",
-           "Colour and depth images whose stamps differ by more are not paired.")
-      .key("decode_ahead", integer(c.replay.decode_ahead, 1, 64), "frames",
-           "Images decoded before they are due, on a thread of their own.")
-      .key("loop", BoolField{&c.replay.loop}, "", "Begin again at the end of the recording.");
-  schema.section("source.synthetic", "The rendered world, for `kind = \"synthetic\"`. Its image size is the calibration's.")
-      .key("world",
-           choice(c.synthetic.world, {{"room", SyntheticWorldKind::Room},
-                                      {"corridor", SyntheticWorldKind::Corridor},
-                                      {"office", SyntheticWorldKind::Office},
-                                      {"twin_rooms", SyntheticWorldKind::TwinRooms}}),
-           "",
-           "Where the camera is: `room` sweeps the view once around a furnished room in 60 s; the others are walked through, round "
-           "after round: `corridor` is a ring, 30 m and 45 s a round; `office` has 10 x 8 m, desks and partitions, 43 s a round; "
-           "`twin_rooms` are two rooms that look exactly alike, joined by a corridor, 40 s a round.")
-      .key("mode", choice(c.synthetic.mode, {{"sitting", SyntheticMode::Sitting}, {"walking", SyntheticMode::Walking}}), "",
-           "What the people in the room do: `sitting` moves heads and arms, `walking` crosses the view.")
-      .key("people", integer(c.synthetic.people, 0, 20), "", "People in the room; the other worlds have none, and need 0.")
-      .key("seed", integer(c.synthetic.seed, 0, std::numeric_limits<std::int64_t>::max()), "",
-           "Of the random world, motion and noise: the same seed renders the same frames.")
-      .key("rate_hz", real(c.synthetic.rate_hz, 1.0, 240.0), "Hz", "Frame rate.")
-      .key("duration_s", real(c.synthetic.duration_s, 0.0, 1e6), "s", "Length of the simulation; 0 is endless.")
-      .key("sensor_noise", BoolField{&c.synthetic.sensor_noise}, "",
-           "Add the noise, quantisation and holes of a real depth camera.");
 }
 
 void add_camera(SchemaBuilder& schema, CameraConfig& c) {
@@ -297,6 +196,7 @@ Schema config_schema(Config& config) {
   add_detector(schema, config.detector);
   add_dynamic(schema, config.dynamic);
   add_publisher(schema, config.publisher);
+  add_gpio(schema, config.gpio);
   add_pipeline(schema, config.pipeline);
   schema.section("logging", "Messages for people, on standard error.")
       .key("level", choice(config.logging.level, {"debug", "info", "warning", "error", "off"}), "",

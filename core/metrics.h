@@ -19,6 +19,16 @@ class Counter {
   std::atomic<std::uint64_t> value_{0};
 };
 
+/// The newest of a value that goes up and down. Thread-safe, lock-free.
+class Gauge {
+ public:
+  void set(std::int64_t value) noexcept { value_.store(value, std::memory_order_relaxed); }
+  std::int64_t value() const noexcept { return value_.load(std::memory_order_relaxed); }
+
+ private:
+  std::atomic<std::int64_t> value_{0};
+};
+
 /// Quantiles of a set of durations. Plain data.
 struct LatencySummary {
   std::uint64_t count = 0;

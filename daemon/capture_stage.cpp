@@ -31,6 +31,11 @@ bool CaptureStage::next(const std::stop_token& stop, FrameRef& frame) {
         on_error_(capture.error);
       }
       return true;
+    case CaptureKind::Interrupted:
+      if (on_error_) {
+        on_error_(capture.error);
+      }
+      return true;
     case CaptureKind::NoFreeSlot:
       no_slot_.add();
       ++explained_gap_;
@@ -62,6 +67,7 @@ void CaptureStage::run(const std::stop_token& stop, FrameLink& out, NewestFrameL
 void CaptureStage::report(HealthReport& health) const {
   health.source_failed = failed_.load(std::memory_order_relaxed);
   health.source_ended = ended_.load(std::memory_order_relaxed);
+  health.source = source_.health();
   health.frames_captured = captured_.value();
   health.frames_skipped = skipped_.value();
   health.frames_missed = missed_.value();

@@ -6,6 +6,7 @@
 
 #include "core/estimates.h"
 #include "core/metrics.h"
+#include "drivers/rgbd_source.h"
 
 namespace posed {
 
@@ -14,6 +15,7 @@ struct HealthReport {
   TrackingState state = TrackingState::Initializing;
   bool source_failed = false;
   bool source_ended = false;
+  SourceHealth source;
 
   std::uint64_t frames_captured = 0;  ///< frames that reached the pool
   std::uint64_t frames_skipped = 0;   ///< bad frames of the source, left out

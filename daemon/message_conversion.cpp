@@ -139,6 +139,12 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.state = static_cast<std::int8_t>(health.state);
   message.source_failed = health.source_failed ? 1 : 0;
   message.source_ended = health.source_ended ? 1 : 0;
+  message.source_connected = health.source.connected ? 1 : 0;
+  message.source_reconnects = count(health.source.reconnects);
+  message.source_stalls = count(health.source.stalls);
+  message.source_unpaired = count(health.source.unpaired);
+  message.source_clock_resets = count(health.source.clock_resets);
+  message.source_clock_error_ns = health.source.clock_error_ns;
   message.frames_captured = count(health.frames_captured);
   message.frames_skipped = count(health.frames_skipped);
   message.frames_missed = count(health.frames_missed);

@@ -159,6 +159,10 @@ bool Supervisor::look(App& app) {
     log_info("state: {}", to_string(state_));
     notify_systemd(fmt::format("STATUS={}", to_string(state_)));
   }
+  if (health.source.connected != source_connected_) {
+    source_connected_ = health.source.connected;
+    log_info("source: {}", source_connected_ ? "frames come" : "no frames; waiting for the camera");
+  }
   if (now_ns >= next_health_log_ns_) {
     log_health(health);
     next_health_log_ns_ = now_ns + options_.health_log_period_ns;
@@ -206,9 +210,16 @@ std::string describe(const HealthReport& health, double rate_hz) {
       "{}{}, {:.1f} frames/s; frames tracked {}, lost {}, not processed {}; poses published {}, dropped {}, errors {}; track p50 "
       "{:.1f} ms p99 "
       "{:.1f} ms; capture to publish p50 {:.1f} ms p99 {:.1f} ms; map {} keyframes, {} landmarks",
-      to_string(health.state), health.source_failed ? ", source failed" : "", rate_hz, health.frames_tracked, health.frames_lost,
-      lost_before_tracker, health.poses_published, health.poses_dropped, health.publish_errors, health.track.p50_ms,
-      health.track.p99_ms, health.latency.p50_ms, health.latency.p99_ms, health.map_keyframes, health.map_landmarks);
+      to_string(health.state),
+      health.source_failed      ? ", source failed"
+      : health.source.connected ? ""
+                                : ", waiting for the camera",
+      rate_hz, health.frames_tracked, health.frames_lost, lost_before_tracker, health.poses_published, health.poses_dropped,
+      health.publish_errors, health.track.p50_ms, health.track.p99_ms, health.latency.p50_ms, health.latency.p99_ms,
+      health.map_keyframes, health.map_landmarks);
+  if (health.source.reconnects + health.source.stalls > 0) {
+    line += fmt::format("; camera back {} times, silent {} times", health.source.reconnects, health.source.stalls);
+  }
   if (!health.detector_model.empty()) {
     line += fmt::format("; people looked for in {} frames by {}, p50 {:.1f} ms p99 {:.1f} ms, {} given up", health.detected,
                         health.detector_model, health.detect.p50_ms, health.detect.p99_ms, health.detections_abandoned);

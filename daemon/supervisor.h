@@ -54,6 +54,7 @@ class Supervisor {
 
   bool looked_ = false;
   TrackingState state_ = TrackingState::Initializing;
+  bool source_connected_ = true;
   bool source_done_ = false;
   TimeNs next_health_log_ns_ = 0;
   std::uint64_t frames_at_last_log_ = 0;

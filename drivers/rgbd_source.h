@@ -24,6 +24,7 @@ struct SourceInfo {
 enum class CaptureKind {
   Frame,         ///< `frame` holds it
   SkippedFrame,  ///< a frame was bad and is left out; `error` says why, and the next call goes on
+  Interrupted,   ///< the camera is away or silent and will be tried again; `error` says why, and the next call waits for it
   NoFreeSlot,    ///< the pool had no room; the frame is lost
   EndOfStream,   ///< a recording or a bounded simulation has ended
   Stopped,       ///< the stop token was triggered
@@ -36,8 +37,18 @@ struct Capture {
   Error error;
 };
 
+/// How a source fares. Counters only grow. Plain data.
+struct SourceHealth {
+  bool connected = true;           ///< it delivers frames; a camera that is away does not
+  std::uint64_t reconnects = 0;    ///< times that a camera delivered again after it had been away or silent
+  std::uint64_t stalls = 0;        ///< times that it delivered nothing for too long
+  std::uint64_t unpaired = 0;      ///< colour or depth images left out for want of the other
+  std::uint64_t clock_resets = 0;  ///< times that the device's clock began anew
+  TimeNs clock_error_ns = 0;       ///< of the device's stamps on the monotonic clock, estimated
+};
+
 /// Delivers RGB-D frames. Thread-bound: `start` and `next` are called by one thread, the capture thread; the constructor may run
-/// elsewhere. No exception leaves it.
+/// elsewhere, and `health` anywhere. No exception leaves it.
 class RgbdSource {
  public:
   virtual ~RgbdSource() = default;
@@ -50,6 +61,9 @@ class RgbdSource {
   /// Waits for the next frame. With Pacing::Realtime it returns when the frame is due; with Pacing::Lockstep as soon as it is
   /// ready, and then NoFreeSlot is never returned: it waits for a slot. Returns within 100 ms of a stop request.
   virtual Capture next(std::stop_token stop) = 0;
+
+  /// Thread-safe.
+  virtual SourceHealth health() const { return {}; }
 };
 
 /// Opens the source that the configuration names. Errors: NotFound, BadData, InvalidArgument (size differs from the calibration).

@@ -60,6 +60,12 @@ HealthReport from_status_message(const status_t& message) {
   health.state = state_of(message.state);
   health.source_failed = message.source_failed != 0;
   health.source_ended = message.source_ended != 0;
+  health.source.connected = message.source_connected != 0;
+  health.source.reconnects = count_of(message.source_reconnects);
+  health.source.stalls = count_of(message.source_stalls);
+  health.source.unpaired = count_of(message.source_unpaired);
+  health.source.clock_resets = count_of(message.source_clock_resets);
+  health.source.clock_error_ns = message.source_clock_error_ns;
   health.frames_captured = count_of(message.frames_captured);
   health.frames_skipped = count_of(message.frames_skipped);
   health.frames_missed = count_of(message.frames_missed);
