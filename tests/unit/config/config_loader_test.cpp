@@ -129,8 +129,10 @@ TEST_F(ConfigLoader, WrongTypes) {
             "posed.toml:1:25: tracker.pyramid_scale: true: wrong type (boolean), expected number, allowed 1.05 to 2.0");
   EXPECT_EQ(error_of("source.replay.loop = 1"),
             "posed.toml:1:22: source.replay.loop: 1: wrong type (integer), expected boolean, allowed true or false");
-  EXPECT_EQ(error_of("source.kind = 1"),
-            "posed.toml:1:15: source.kind: 1: wrong type (integer), expected string, allowed \"synthetic\" or \"replay\"");
+  EXPECT_EQ(
+      error_of("source.kind = 1"),
+      "posed.toml:1:15: source.kind: 1: wrong type (integer), expected string, allowed \"synthetic\", \"replay\", \"openni2\", "
+      "\"v4l2\" or \"libcamera\"");
   EXPECT_EQ(
       error_of("publisher.channel_prefix = 1979-05-27"),
       "posed.toml:1:28: publisher.channel_prefix: a date or time: wrong type (date-time), expected string, allowed at most 31 "
@@ -186,7 +188,8 @@ TEST_F(ConfigLoader, Poses) {
 
 TEST_F(ConfigLoader, Choices) {
   EXPECT_EQ(error_of("source.kind = \"kinect\""),
-            "posed.toml:1:15: source.kind: \"kinect\": unknown choice, allowed \"synthetic\" or \"replay\"");
+            "posed.toml:1:15: source.kind: \"kinect\": unknown choice, allowed \"synthetic\", \"replay\", \"openni2\", "
+            "\"v4l2\" or \"libcamera\"");
   EXPECT_EQ(
       error_of("logging.level = \"INFO\""),
       "posed.toml:1:17: logging.level: \"INFO\": unknown choice, allowed \"debug\", \"info\", \"warning\", \"error\" or \"off\"");
@@ -232,8 +235,9 @@ TEST_F(ConfigLoader, UnknownTablesAreReportedOnce) {
   EXPECT_EQ(error_of("[pipeline.captur]\npriority = 1"),
             "posed.toml:1:11: pipeline.captur: unknown table; did you mean pipeline.capture?");
   EXPECT_EQ(error_of("[quantum]\nspin.up = 1"),
-            "posed.toml:1:2: quantum: unknown table; allowed here: source, source.replay, source.synthetic, camera, tracker, "
-            "mapper, map, detector, dynamic, publisher, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, "
+            "posed.toml:1:2: quantum: unknown table; allowed here: source, source.replay, source.synthetic, source.live, "
+            "source.openni2, source.v4l2, source.libcamera, source.depth, camera, tracker, "
+            "mapper, map, detector, dynamic, publisher, gpio, pipeline, pipeline.capture, pipeline.tracker, pipeline.mapper, "
             "pipeline.detector, "
             "pipeline.publisher, logging");
 }
@@ -295,6 +299,27 @@ TEST_F(ConfigLoader, RulesBetweenKeys) {
                                                                             ".policy: \"fifo\": policy \"fifo\" needs pipeline." +
                                                                             thread + ".priority from 1 to 99");
   }
+}
+
+TEST_F(ConfigLoader, CamerasNeedDepthAndDoNotWait) {
+  EXPECT_EQ(error_of("source.kind = \"v4l2\"\nsource.depth.device = \"/dev/video2\""),
+            "posed.toml:1:15: source.kind: \"v4l2\": needs source.v4l2.device, the node of the colour camera");
+  EXPECT_EQ(
+      error_of("source.kind = \"libcamera\""),
+      "posed.toml:1:15: source.kind: \"libcamera\": a colour camera alone cannot be tracked in metres: set source.depth.device, "
+      "the node of a depth camera");
+  EXPECT_EQ(error_of("source.kind = \"openni2\"\nsource.pacing = \"lockstep\""),
+            "posed.toml:2:17: source.pacing: \"lockstep\": a camera does not wait: \"lockstep\" is for recordings and the rendered "
+            "world");
+  EXPECT_TRUE(
+      parse_config("source.kind = \"openni2\"\nsource.pacing = \"lockstep\"\nsource.openni2.device = \"a.oni\"", "posed.toml"));
+  EXPECT_EQ(error_of("source.v4l2.controls = [\"gain=3\", \"exposure\"]"),
+            "posed.toml:1:35: source.v4l2.controls: \"exposure\": element 2 of 2: not allowed, must be a text NAME=VALUE");
+}
+
+TEST_F(ConfigLoader, GpioLinesDiffer) {
+  EXPECT_EQ(error_of("gpio.status_line = 3\ngpio.trigger_line = 3"),
+            "posed.toml:1:20: gpio.status_line: 3: status_line, enable_line and trigger_line must be different lines");
 }
 
 TEST_F(ConfigLoader, ARuleOverARefusedKeySaysNothing) {

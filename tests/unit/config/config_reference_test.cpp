@@ -106,6 +106,12 @@ void randomise(const Field& field, std::mt19937_64& random) {
 void satisfy_rules(Config& c) {
   c.source.replay.sequence = "/recordings/\"quoted\" \\ \t\xC3\xA9";
   c.source.synthetic.people = c.source.synthetic.world == SyntheticWorldKind::Room ? c.source.synthetic.people : 0;
+  c.source.v4l2.device = "/dev/video0";
+  c.source.depth.node.device = "/dev/video2";
+  c.source.pacing =
+      c.source.kind == SourceKind::Synthetic || c.source.kind == SourceKind::Replay ? c.source.pacing : Pacing::Realtime;
+  c.gpio.status_line = -1;
+  c.gpio.trigger_line = -1;
   c.map.file = "/maps/hall";
   c.detector.enabled = false;  // the models would come back as paths
   c.tracker.fast_threshold_minimum = std::min(c.tracker.fast_threshold_minimum, c.tracker.fast_threshold);
@@ -137,9 +143,12 @@ TEST(ConfigRoundTrip, RandomValuesReadBackTheSame) {
     // Normalising a quaternion again may change its last digit: compare poses by value and everything else by text.
     Config same = *read;
     EXPECT_TRUE(same.camera.T_base_camera.rotation().isApprox(config.camera.T_base_camera.rotation(), 1e-15));
+    EXPECT_TRUE(same.source.depth.T_camera_depth.rotation().isApprox(config.source.depth.T_camera_depth.rotation(), 1e-15));
     EXPECT_TRUE(same.camera.T_map_start.rotation().isApprox(config.camera.T_map_start.rotation(), 1e-15));
     EXPECT_EQ(same.camera.T_base_camera.translation(), config.camera.T_base_camera.translation());
+    EXPECT_EQ(same.source.depth.T_camera_depth.translation(), config.source.depth.T_camera_depth.translation());
     same.camera = config.camera;
+    same.source.depth.T_camera_depth = config.source.depth.T_camera_depth;
     EXPECT_EQ(to_toml(same), text);
   }
 }
