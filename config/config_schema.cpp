@@ -102,6 +102,7 @@ void add_map(SchemaBuilder& schema, MapConfig& c) {
            "Time between two saves while there is something new; 0: the map is saved at shutdown and on request alone. In "
            "`lockstep` there "
            "are none either.")
+      .live()
       .key("mode", choice(c.mode, {{"mapping", MapMode::Mapping}, {"localization", MapMode::Localization}}), "",
            "`mapping` extends the map; `localization` uses the map of `file`, and neither changes nor saves it.");
 }
@@ -150,6 +151,7 @@ void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {
       .key("channel_prefix", TextField{&c.channel_prefix, {"at most 31 letters, digits and underscores", is_channel_prefix}}, "",
            "What the names of all channels begin with.")
       .key("status_period_s", real(c.status_period_s, 0.1, 60.0), "s", "Time between two status messages.")
+      .live()
       .key("retry_period_s", real(c.retry_period_s, 0.1, 3600.0), "s",
            "Time between two attempts to start LCM, where it cannot start.")
       .key("bot_core_pose", BoolField{&c.bot_core_pose}, "",
@@ -200,7 +202,8 @@ Schema config_schema(Config& config) {
   add_pipeline(schema, config.pipeline);
   schema.section("logging", "Messages for people, on standard error.")
       .key("level", choice(config.logging.level, {"debug", "info", "warning", "error", "off"}), "",
-           "Least severe messages that are shown.");
+           "Least severe messages that are shown.")
+      .live();
   return std::move(schema).build();
 }
 

@@ -68,6 +68,12 @@ class SchemaBuilder {
     return *this;
   }
 
+  /// A running daemon takes a new value of the key added last.
+  SchemaBuilder& live() {
+    schema_.back().keys.back().live = true;
+    return *this;
+  }
+
   Schema build() && { return std::move(schema_); }
 
  private:

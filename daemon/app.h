@@ -70,6 +70,9 @@ class App {
   /// is configured.
   virtual Status request_map_save() = 0;
 
+  /// Takes over what may change while it runs (keys that are `live`); the rest of `config` is not looked at. Thread-safe.
+  virtual void apply(const Config& config) = 0;
+
   /// After `stop`: the present pose of a keyframe, to rebuild the final trajectory as T_map_keyframe * T_reference_camera.
   virtual std::optional<Se3> keyframe_pose(std::uint64_t keyframe) const = 0;
 };

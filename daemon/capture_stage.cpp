@@ -48,6 +48,7 @@ bool CaptureStage::next(const std::stop_token& stop, FrameRef& frame) {
 }
 
 void CaptureStage::run(const std::stop_token& stop, FrameLink& out, NewestFrameLink& newest) {
+  running_.store(true, std::memory_order_relaxed);
   bool more = begin();
   while (more && !stop.stop_requested()) {
     FrameRef frame;
@@ -60,8 +61,13 @@ void CaptureStage::run(const std::stop_token& stop, FrameLink& out, NewestFrameL
       out.notify_arrived();
     }
   }
+  running_.store(false, std::memory_order_relaxed);
   out.close();
   newest.close();
+}
+
+TimeNs CaptureStage::silent_ns(TimeNs now_ns) const {
+  return running_.load(std::memory_order_relaxed) ? source_.heartbeat().silent_ns(now_ns) : 0;
 }
 
 void CaptureStage::report(HealthReport& health) const {

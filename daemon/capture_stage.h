@@ -32,6 +32,9 @@ class CaptureStage {
 
   void report(HealthReport& health) const;
 
+  /// For how long the source has shown no sign; 0 where nothing is expected of it. Thread-safe.
+  TimeNs silent_ns(TimeNs now_ns) const;
+
  private:
   void fail(const Error& error);
   void count_missed(std::uint64_t sequence);
@@ -47,6 +50,7 @@ class CaptureStage {
   Counter missed_;
   std::uint64_t next_sequence_ = 0;
   std::uint64_t explained_gap_ = 0;  // frames since the last delivered one that were skipped or had no slot
+  std::atomic<bool> running_{false};
   std::atomic<bool> failed_{false};
   std::atomic<bool> ended_{false};
 };

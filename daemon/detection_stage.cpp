@@ -7,15 +7,18 @@
 
 namespace posed {
 
-DetectionStage::DetectionStage(FrameDetector* detector, Links links, std::function<void()> wake_publisher, int lockstep_lag)
+DetectionStage::DetectionStage(FrameDetector* detector, Links links, std::function<void()> wake_publisher, int lockstep_lag,
+                               const Clock& clock)
     : detector_(detector),
       links_(links),
       wake_publisher_(std::move(wake_publisher)),
+      clock_(clock),
       delayed_(static_cast<std::size_t>(lockstep_lag) + 1) {}
 
 void DetectionStage::run(const std::stop_token& stop) {
   Detections found;
   links_.frames.consume(stop, [&](const RgbdFrame& frame) {
+    const HeartbeatScope working(heartbeat_, clock_);
     const Result<DetectionOutcome> outcome = detector_->detect(frame, found);
     note(outcome);
     if (outcome && outcome->finished) {

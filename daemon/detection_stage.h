@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/detections.h"
+#include "core/heartbeat.h"
 #include "core/latest_value.h"
 #include "core/metrics.h"
 #include "core/rgbd_frame.h"
@@ -30,7 +31,7 @@ class DetectionStage {
   /// `detector` may be null: then nobody is looked for. Everything passed in must outlive the stage. `wake_publisher` is called
   /// after something was put into the publisher's link, or it was closed. `lockstep_lag`: frames by which the tracker gets
   /// detections late in lockstep.
-  DetectionStage(FrameDetector* detector, Links links, std::function<void()> wake_publisher, int lockstep_lag);
+  DetectionStage(FrameDetector* detector, Links links, std::function<void()> wake_publisher, int lockstep_lag, const Clock& clock);
 
   bool is_enabled() const { return detector_ != nullptr; }
 
@@ -45,6 +46,7 @@ class DetectionStage {
   void close_output();
 
   void report(HealthReport& health) const;
+  const Heartbeat& heartbeat() const { return heartbeat_; }
 
  private:
   void note(const Result<DetectionOutcome>& outcome);
@@ -53,6 +55,7 @@ class DetectionStage {
   FrameDetector* detector_;
   Links links_;
   std::function<void()> wake_publisher_;
+  const Clock& clock_;
   bool complained_ = false;          // of the engine
   std::vector<Detections> delayed_;  // in lockstep, a ring: those that the tracker does not know yet
   std::size_t next_delayed_ = 0;
@@ -63,6 +66,7 @@ class DetectionStage {
   Counter dropped_;
   std::atomic<std::size_t> model_{0};
   LatencyHistogram detect_time_;
+  Heartbeat heartbeat_;
   LatencyHistogram overrun_;
 };
 

@@ -10,12 +10,22 @@
 
 namespace posed {
 
+/// How long each thread has been at its present piece of work, or has shown no sign while it waits for frames; 0: it rests.
+struct ThreadProgress {
+  TimeNs capture_ns = 0;
+  TimeNs tracker_ns = 0;
+  TimeNs mapper_ns = 0;
+  TimeNs detector_ns = 0;
+  TimeNs publisher_ns = 0;
+};
+
 /// State, counters and latencies of a running pipeline at one instant. Counters only grow. Plain data.
 struct HealthReport {
   TrackingState state = TrackingState::Initializing;
   bool source_failed = false;
   bool source_ended = false;
   SourceHealth source;
+  ThreadProgress progress;
 
   std::uint64_t frames_captured = 0;  ///< frames that reached the pool
   std::uint64_t frames_skipped = 0;   ///< bad frames of the source, left out

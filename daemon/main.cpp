@@ -7,8 +7,11 @@
 #include <sysexits.h>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "config/config_loader.h"
+#include "config/config_reload.h"
 #include "core/logging.h"
 #include "daemon/app.h"
 #include "daemon/exit_code.h"
@@ -34,12 +37,34 @@ int fail(const Error& error) {
   return fail(error, exit_code(error.code));
 }
 
-int run_daemon(const Config& config, bool exit_at_end) {
+/// Reads the file again: what can change while the daemon runs does, and the rest is named.
+void reload(const std::filesystem::path& file, Config& running, App& app) {
+  const Result<Config> fresh = load_config(file);
+  if (!fresh) {
+    log_error("SIGHUP: nothing changes: {}", fresh.error().message);
+    return;
+  }
+  const ReloadOutcome outcome = take_live_values(*fresh, running);
+  if (const Result<LogLevel> level = parse_log_level(running.logging.level)) {
+    set_log_level(*level);
+  }
+  app.apply(running);
+  log_info("SIGHUP: read {} again; new values of {}", file.string(),
+           outcome.taken.empty() ? "no key" : fmt::format("{}", fmt::join(outcome.taken, ", ")));
+  if (!outcome.refused.empty()) {
+    log_warning("SIGHUP: {} changed in the file, and need a restart", fmt::join(outcome.refused, ", "));
+  }
+}
+
+int run_daemon(Config config, const Arguments& arguments) {
   if (const Status blocked = Supervisor::block_signals(); !blocked) {
     return fail(blocked.error());
   }
   SupervisorOptions supervisor_options;
-  supervisor_options.exit_at_end = exit_at_end;
+  supervisor_options.exit_at_end = arguments.exit_at_end;
+  if (!arguments.config.empty()) {
+    supervisor_options.reload = [&](App& running) { reload(arguments.config, config, running); };
+  }
   Supervisor supervisor(supervisor_options);
 
   AppOptions app_options;
@@ -69,7 +94,7 @@ int run(const Arguments& arguments) {
     return EX_OK;
   }
   set_log_level(*level);
-  return run_daemon(*config, arguments.exit_at_end);
+  return run_daemon(*config, arguments);
 }
 
 }  // namespace

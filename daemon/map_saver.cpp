@@ -13,7 +13,7 @@
 namespace posed {
 
 MapSaver::MapSaver(KeyframeMapper& mapper, MapFiles files, TimeNs period_ns, const Clock& clock)
-    : mapper_(mapper), files_(std::move(files)), period_ns_(period_ns), clock_(clock), next_save_ns_(clock.now_ns() + period_ns) {}
+    : mapper_(mapper), files_(std::move(files)), period_ns_(period_ns), clock_(clock), last_save_ns_(clock.now_ns()) {}
 
 Result<bool> MapSaver::load() {
   if (const Status folder = check_folder(); !folder) {
@@ -56,7 +56,8 @@ Status MapSaver::check_folder() const {
 
 void MapSaver::save_if_due() {
   const std::uint64_t requested = requested_.load(std::memory_order_acquire);
-  const bool period_over = period_ns_ > 0 && changed_ && clock_.now_ns() >= next_save_ns_;
+  const TimeNs period_ns = period_ns_.load(std::memory_order_relaxed);
+  const bool period_over = period_ns > 0 && changed_ && clock_.now_ns() - last_save_ns_ >= period_ns;
   if (can_save() && (requested != served_ || period_over)) {
     save(requested);
   }
@@ -92,7 +93,7 @@ void MapSaver::save(std::uint64_t requested) {
     note_success(outcome);
   }
   served_ = requested;
-  next_save_ns_ = clock_.now_ns() + period_ns_;
+  last_save_ns_ = clock_.now_ns();
   outcomes_.back() = std::move(outcome);
   outcomes_.publish();
 }

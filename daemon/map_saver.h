@@ -46,6 +46,9 @@ class MapSaver {
   /// After the last keyframe: saves if there was any.
   void save_at_end();
 
+  /// 0: no periodic saves. Thread-safe; holds from the last save on.
+  void set_period(TimeNs period_ns) noexcept { period_ns_.store(period_ns, std::memory_order_relaxed); }
+
   /// Whether there is any file. Thread-safe.
   bool has_files() const { return !files_.load.empty() || !files_.save.empty(); }
 
@@ -68,10 +71,10 @@ class MapSaver {
 
   KeyframeMapper& mapper_;
   MapFiles files_;
-  TimeNs period_ns_;
+  std::atomic<TimeNs> period_ns_;
   const Clock& clock_;
 
-  TimeNs next_save_ns_;
+  TimeNs last_save_ns_;    // or the start
   bool changed_ = false;   // since the last save
   bool extended_ = false;  // since the start
   std::uint64_t served_ = 0;

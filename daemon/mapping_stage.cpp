@@ -18,6 +18,7 @@ void MappingStage::publish_map() {
 }
 
 bool MappingStage::step(const Interrupt& interrupt) {
+  const HeartbeatScope working(heartbeat_, clock_);
   saver_.save_if_due();
   const KeyframeRecord* const record = in_.ring.front();
   if (record == nullptr) {
@@ -43,7 +44,10 @@ void MappingStage::run(const std::stop_token& stop, const std::function<void()>&
 }
 
 void MappingStage::finish(const std::stop_token& stop, const std::function<void()>& on_drained) {
-  saver_.save_at_end();
+  {
+    const HeartbeatScope working(heartbeat_, clock_);
+    saver_.save_at_end();
+  }
   on_drained();
   while (!stop.stop_requested()) {
     const std::uint32_t seen = in_.generation();

@@ -6,6 +6,7 @@
 #include <stop_token>
 
 #include "core/clock.h"
+#include "core/heartbeat.h"
 #include "core/latest_value.h"
 #include "core/metrics.h"
 #include "daemon/health.h"
@@ -38,6 +39,7 @@ class MappingStage {
   void finish(const std::stop_token& stop, const std::function<void()>& on_drained);
 
   void report(HealthReport& health) const;
+  const Heartbeat& heartbeat() const { return heartbeat_; }
 
  private:
   KeyframeMapper& mapper_;
@@ -51,6 +53,7 @@ class MappingStage {
   std::atomic<std::uint64_t> loops_closed_{0};
   std::atomic<std::uint64_t> maps_joined_{0};
   std::atomic<std::uint64_t> relocalizations_{0};
+  Heartbeat heartbeat_;
   LatencyHistogram map_time_;
 };
 

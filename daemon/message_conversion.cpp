@@ -4,6 +4,8 @@
 #include <iterator>
 #include <limits>
 
+#include "daemon/progress_watch.h"
+
 namespace posed {
 
 namespace {
@@ -139,6 +141,9 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.state = static_cast<std::int8_t>(health.state);
   message.source_failed = health.source_failed ? 1 : 0;
   message.source_ended = health.source_ended ? 1 : 0;
+  ProgressWatch watch;
+  watch.look(health.progress);
+  message.stuck = watch.stuck();
   message.source_connected = health.source.connected ? 1 : 0;
   message.source_reconnects = count(health.source.reconnects);
   message.source_stalls = count(health.source.stalls);

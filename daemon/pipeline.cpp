@@ -75,6 +75,7 @@ class Pipeline final : public App {
  public:
   Pipeline(const Config& config, AppOptions options, const Clock& clock, PipelineParts parts)
       : config_(config),
+        clock_(clock),
         parts_(std::move(parts)),
         pool_(parts_.source->info().width, parts_.source->info().height,
               size_of(config.pipeline.frame_slots) + parts_.source->info().slots_held),
@@ -87,7 +88,7 @@ class Pipeline final : public App {
         mapping_(*parts_.mapper, links_.keyframes, links_.snapshots, saver_, clock),
         detection_(
             parts_.detector.get(), {links_.newest_frame, links_.detections, links_.newest_detections},
-            [this] { links_.estimates.wake_all(); }, config.dynamic.lockstep_lag),
+            [this] { links_.estimates.wake_all(); }, config.dynamic.lockstep_lag, clock),
         publish_({links_.estimates, links_.detections}, make_publisher(clock),
                  {std::move(options.on_estimate), std::move(options.on_detections)}, clock) {}
 
@@ -154,6 +155,12 @@ class Pipeline final : public App {
     mapping_.report(health);
     detection_.report(health);
     publish_.report(health);
+    const TimeNs now_ns = clock_.now_ns();
+    health.progress = {.capture_ns = capture_.silent_ns(now_ns),
+                       .tracker_ns = tracking_.heartbeat().silent_ns(now_ns),
+                       .mapper_ns = mapping_.heartbeat().silent_ns(now_ns),
+                       .detector_ns = detection_.heartbeat().silent_ns(now_ns),
+                       .publisher_ns = publish_.heartbeat().silent_ns(now_ns)};
     health.peak_rss_bytes = peak_rss_bytes();
     return health;
   }
@@ -163,6 +170,11 @@ class Pipeline final : public App {
       saver_.request();
       links_.keyframes.wake_all();
     });
+  }
+
+  void apply(const Config& config) override {
+    publish_.set_status_period(from_seconds(config.publisher.status_period_s));
+    saver_.set_period(is_lockstep() ? 0 : from_seconds(config.map.save_period_s));
   }
 
   std::optional<Se3> keyframe_pose(std::uint64_t keyframe) const override { return parts_.mapper->keyframe_pose(keyframe); }
@@ -242,6 +254,7 @@ class Pipeline final : public App {
   }
 
   Config config_;
+  const Clock& clock_;
   PipelineParts parts_;
   FramePool pool_;
   Links links_;  // holds frames of the pool, so it goes before it

@@ -18,6 +18,7 @@ PublishStage::PublishStage(Inputs in, std::unique_ptr<Publisher> publisher, Obse
 void PublishStage::run(const std::stop_token& stop, const std::function<void()>& on_drained) {
   bool drained = false;
   while (!stop.stop_requested()) {
+    heartbeat_.beat(clock_.now_ns());
     const std::uint32_t seen = in_.estimates.generation();
     const bool was_closed = in_.estimates.is_closed() && in_.detections.is_closed();
     const TimeNs due_ns = publisher_ ? publisher_->do_due_work() : clock_.now_ns() + kLongestSleepNs;
@@ -31,6 +32,7 @@ void PublishStage::run(const std::stop_token& stop, const std::function<void()>&
       }
       on_drained();
     }
+    heartbeat_.rest();
     in_.estimates.wait_arrived(seen, std::clamp<TimeNs>(due_ns - clock_.now_ns(), 0, kLongestSleepNs));
   }
   if (publisher_) {
@@ -72,6 +74,12 @@ bool PublishStage::publish_detections() {
     observers_.on_detections(*detections);
   }
   return true;
+}
+
+void PublishStage::set_status_period(TimeNs period_ns) noexcept {
+  if (publisher_) {
+    publisher_->set_status_period(period_ns);
+  }
 }
 
 void PublishStage::report(HealthReport& health) const {

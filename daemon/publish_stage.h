@@ -7,6 +7,7 @@
 #include "core/clock.h"
 #include "core/detections.h"
 #include "core/estimates.h"
+#include "core/heartbeat.h"
 #include "core/metrics.h"
 #include "daemon/health.h"
 #include "daemon/publisher.h"
@@ -36,6 +37,10 @@ class PublishStage {
 
   void report(HealthReport& health) const;
 
+  /// Thread-safe.
+  void set_status_period(TimeNs period_ns) noexcept;
+  const Heartbeat& heartbeat() const { return heartbeat_; }
+
  private:
   /// Publishes the oldest estimate, or else the oldest detections that wait; false where there is nothing.
   bool step();
@@ -46,6 +51,7 @@ class PublishStage {
   std::unique_ptr<Publisher> publisher_;
   Observers observers_;
   const Clock& clock_;
+  Heartbeat heartbeat_;
   LatencyHistogram latency_;
 };
 

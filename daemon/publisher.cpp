@@ -21,7 +21,8 @@ Publisher::Publisher(const PublisherConfig& config, const Se3& T_base_camera, st
       clock_(clock),
       health_(std::move(health)),
       requests_(std::move(requests)),
-      times_{0, std::numeric_limits<TimeNs>::min(), std::numeric_limits<TimeNs>::min()} {
+      times_{0, std::numeric_limits<TimeNs>::min(), std::numeric_limits<TimeNs>::min()},
+      status_period_ns_(from_seconds(config.status_period_s)) {
   if (requests_) {
     transport_->subscribe(channels_.map_request, [this](std::span<const std::uint8_t> message) { requests_->receive(message); });
   }
@@ -49,7 +50,7 @@ TimeNs Publisher::do_due_work() {
   }
   if (now_ns >= times_.next_status_ns) {
     publish_status();
-    times_.next_status_ns = now_ns + from_seconds(config_.status_period_s);
+    times_.next_status_ns = now_ns + status_period_ns_.load(std::memory_order_relaxed);
   }
   if (open_ && requests_) {
     answer_requests();

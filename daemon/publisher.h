@@ -38,6 +38,9 @@ class Publisher {
   /// called next [ns, monotonic].
   TimeNs do_due_work();
 
+  /// Of the status messages. Thread-safe; holds from the next one on.
+  void set_status_period(TimeNs period_ns) noexcept { status_period_ns_.store(period_ns, std::memory_order_relaxed); }
+
   /// Sends a status now: at the end of the source and before a stop.
   void publish_status();
 
@@ -78,6 +81,7 @@ class Publisher {
   } times_;
   std::vector<std::uint8_t> buffer_;
 
+  std::atomic<TimeNs> status_period_ns_;
   Counter poses_published_;
   Counter errors_;
   std::atomic<bool> up_{false};

@@ -1,5 +1,6 @@
 #include "daemon/supervisor.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -36,8 +37,11 @@ extern "C" void forward_to_event_thread(int signal) {
 /// sd-event with what the daemon waits for: a signal that ends it, the signal to save the map, and the time to look.
 class Supervisor::EventLoop {
  public:
-  EventLoop(TimeNs period_ns, std::function<bool()> look, std::function<void()> save_map)
-      : period_us_(static_cast<std::uint64_t>(period_ns / kNsPerUs)), look_(std::move(look)), save_map_(std::move(save_map)) {}
+  EventLoop(TimeNs period_ns, std::function<bool()> look, std::function<void()> save_map, std::function<void()> reload)
+      : period_us_(static_cast<std::uint64_t>(period_ns / kNsPerUs)),
+        look_(std::move(look)),
+        save_map_(std::move(save_map)),
+        reload_(std::move(reload)) {}
 
   /// The signal that ended the loop, or 0 where `look` did.
   Result<int> run() {
@@ -51,6 +55,9 @@ class Supervisor::EventLoop {
     }
     if (status >= 0) {
       status = sd_event_add_signal(event, nullptr, SIGUSR1, &EventLoop::on_save_signal, this);
+    }
+    if (status >= 0) {
+      status = sd_event_add_signal(event, nullptr, SIGHUP, &EventLoop::on_reload_signal, this);
     }
     if (status >= 0) {
       status = sd_event_add_time_relative(event, nullptr, CLOCK_MONOTONIC, period_us_, kAccuracyUs, &EventLoop::on_time, this);
@@ -76,6 +83,11 @@ class Supervisor::EventLoop {
     return 0;
   }
 
+  static int on_reload_signal(sd_event_source*, const signalfd_siginfo*, void* self) {
+    static_cast<EventLoop*>(self)->reload_();
+    return 0;
+  }
+
   static int on_time(sd_event_source* source, std::uint64_t, void* self) {
     auto* const loop = static_cast<EventLoop*>(self);
     if (loop->look_()) {
@@ -88,6 +100,7 @@ class Supervisor::EventLoop {
   std::uint64_t period_us_;
   std::function<bool()> look_;
   std::function<void()> save_map_;
+  std::function<void()> reload_;
 };
 
 Supervisor::Supervisor(SupervisorOptions options) : options_(options), source_errors_(kSourceErrorsKept) {}
@@ -99,7 +112,7 @@ Status Supervisor::block_signals() {
   forward.sa_flags = SA_RESTART;
   sigset_t signals;
   sigemptyset(&signals);
-  for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGUSR1, SIGHUP}) {
     sigaddset(&signals, signal);
     if (sigaction(signal, &forward, nullptr) != 0) {
       return make_error(ErrorCode::Unavailable, fmt::format("signal {} cannot be handled: {}", signal, std::strerror(errno)));
@@ -124,12 +137,17 @@ Result<RunEnd> Supervisor::run(App& app) {
     return tl::unexpected<Error>(started.error());
   }
   log_info("running: {}", app.source_info().description);
-  notify_systemd("READY=1\nSTATUS=running: " + app.source_info().description);
+  std::uint64_t watchdog_us = 0;
+  watchdog_ = sd_watchdog_enabled(0, &watchdog_us) > 0;
+  TimeNs period_ns = options_.poll_period_ns;
+  if (watchdog_) {
+    period_ns = std::min(period_ns, static_cast<TimeNs>(watchdog_us) * kNsPerUs / 3);
+  }
   last_log_ns_ = SystemClock::instance().now_ns();
   next_health_log_ns_ = last_log_ns_ + options_.health_log_period_ns;
 
   EventLoop loop(
-      options_.poll_period_ns, [&] { return look(app); }, [&] { save_map(app); });
+      period_ns, [&] { return look(app); }, [&] { save_map(app); }, [&] { reload(app); });
   const Result<int> ended_by = loop.run();
 
   notify_systemd("STOPPING=1\nSTATUS=stopping");
@@ -152,6 +170,10 @@ Result<RunEnd> Supervisor::run(App& app) {
 bool Supervisor::look(App& app) {
   log_source_errors();
   const HealthReport health = app.health();
+  watch_progress(health);
+  if (!ready_ && (health.frames_tracked + health.frames_lost > 0 || !health.source.connected || health.source_ended)) {
+    notify_ready(app.source_info().description);
+  }
   const TimeNs now_ns = SystemClock::instance().now_ns();
   if (!looked_ || health.state != state_) {
     looked_ = true;
@@ -177,6 +199,34 @@ bool Supervisor::look(App& app) {
 void Supervisor::save_map(App& app) {
   if (const Status requested = app.request_map_save(); !requested) {
     log_warning("SIGUSR1: {}", requested.error().message);
+  }
+}
+
+void Supervisor::reload(App& app) {
+  notify_systemd("RELOADING=1");
+  if (options_.reload) {
+    options_.reload(app);
+  } else {
+    log_warning("SIGHUP: there is no configuration file to read again");
+  }
+  notify_systemd("READY=1");
+}
+
+void Supervisor::notify_ready(const std::string& source) {
+  ready_ = true;
+  notify_systemd("READY=1\nSTATUS=running: " + source);
+}
+
+void Supervisor::watch_progress(const HealthReport& health) {
+  for (const ProgressWatch::Change& change : progress_.look(health.progress)) {
+    if (change.stuck) {
+      log_warning("the {} thread has been at one thing for {:.1f} s", change.thread, to_seconds(change.silent_ns));
+    } else {
+      log_warning("the {} thread moves again", change.thread);
+    }
+  }
+  if (watchdog_ && progress_.makes_progress()) {
+    notify_systemd("WATCHDOG=1");
   }
 }
 

@@ -8,6 +8,7 @@
 #include "core/overflow_ring.h"
 #include "core/result.h"
 #include "daemon/app.h"
+#include "daemon/progress_watch.h"
 
 namespace posed {
 
@@ -15,15 +16,17 @@ struct SupervisorOptions {
   bool exit_at_end = false;  ///< end when the source has ended or failed; otherwise a signal alone ends it
   TimeNs poll_period_ns = 200 * kNsPerMs;
   TimeNs health_log_period_ns = 30 * kNsPerSecond;
+  std::function<void(App&)> reload;  ///< on SIGHUP; empty: there is nothing to read again
 };
 
 /// Why a run ended.
 enum class RunEnd { Signal, SourceEnded, SourceFailed };
 
 /// The main thread's part: runs the pipeline under sd-event until a signal (SIGINT, SIGTERM) or the end of the source, has the map
-/// saved on SIGUSR1, writes the
-/// log that the pipeline's threads must not write, and tells systemd how things stand where $NOTIFY_SOCKET is set. Thread-bound to
-/// the main thread. Must outlive the App that was given its `source_error_sink`.
+/// saved on SIGUSR1 and the configuration read again on SIGHUP, and writes the log that the pipeline's threads must not write.
+/// Where systemd asks ($NOTIFY_SOCKET, $WATCHDOG_USEC) it reports READY=1 as soon as a frame has been processed or a camera is
+/// waited for, and feeds the watchdog as long as capture and tracking make progress. Thread-bound to the main thread. Must outlive
+/// the App that was given its `source_error_sink`.
 class Supervisor {
  public:
   explicit Supervisor(SupervisorOptions options);
@@ -44,6 +47,9 @@ class Supervisor {
   /// Logs what happened since the last look; true where the run has come to its end.
   bool look(App& app);
   static void save_map(App& app);
+  void reload(App& app);
+  void watch_progress(const HealthReport& health);
+  void notify_ready(const std::string& source);
   void log_source_errors();
   void log_health(const HealthReport& health);
 
@@ -54,6 +60,9 @@ class Supervisor {
 
   bool looked_ = false;
   TrackingState state_ = TrackingState::Initializing;
+  ProgressWatch progress_;
+  bool ready_ = false;
+  bool watchdog_ = false;  // systemd waits for signs of life
   bool source_connected_ = true;
   bool source_done_ = false;
   TimeNs next_health_log_ns_ = 0;

@@ -10,6 +10,7 @@ TrackingStage::TrackingStage(FrameTracker& tracker, Links links, const Clock& cl
     : tracker_(tracker), links_(links), clock_(clock), full_queue_(full_queue), on_tracked_(std::move(on_tracked)) {}
 
 void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
+  const HeartbeatScope working(heartbeat_, clock_);
   links_.snapshots.refresh();
   links_.detections.refresh();
   KeyframeRecord* const candidate = links_.keyframes.ring.claim();

@@ -6,6 +6,7 @@
 
 #include "core/clock.h"
 #include "core/detections.h"
+#include "core/heartbeat.h"
 #include "core/latest_value.h"
 #include "core/metrics.h"
 #include "daemon/health.h"
@@ -47,6 +48,7 @@ class TrackingStage {
   void close_outputs();
 
   void report(HealthReport& health) const;
+  const Heartbeat& heartbeat() const { return heartbeat_; }
 
  private:
   void hand_on(const PoseEstimate& estimate, const std::stop_token& stop);
@@ -67,6 +69,7 @@ class TrackingStage {
   Counter keyframes_;
   Counter keyframes_delayed_;
   Counter poses_dropped_;
+  Heartbeat heartbeat_;
   LatencyHistogram track_time_;
 };
 

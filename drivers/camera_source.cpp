@@ -48,6 +48,7 @@ class CameraSource final : public RgbdSource {
       return {CaptureKind::Failed, {}, {ErrorCode::InvalidArgument, "the camera's source was not started"}};
     }
     while (!stop.stop_requested()) {
+      heartbeat_.beat(clock_.now_ns());
       std::optional<Capture> capture = open_ ? read() : reopen();
       if (capture) {
         return std::move(*capture);

@@ -30,7 +30,7 @@ class ReplaySource final : public RgbdSource {
   Capture next(std::stop_token stop) override;
 
  private:
-  bool wait_until(TimeNs due_ns, const std::stop_token& stop) const;
+  bool wait_until(TimeNs due_ns, const std::stop_token& stop);
   Capture deliver(ReplayItem& item, TimeNs capture_ns);
 
   const TumSequence sequence_;
@@ -87,6 +87,7 @@ Capture ReplaySource::next(std::stop_token stop) {
   if (stop.stop_requested()) {
     return {};
   }
+  heartbeat_.beat(clock_.now_ns());
   if (reported_lines_ < sequence_.skipped_lines.size()) {
     return {CaptureKind::SkippedFrame, {}, sequence_.skipped_lines[reported_lines_++]};
   }
@@ -108,11 +109,12 @@ Capture ReplaySource::next(std::stop_token stop) {
   return wait_until(due_ns, stop) ? deliver(*item, due_ns) : Capture{};
 }
 
-bool ReplaySource::wait_until(TimeNs due_ns, const std::stop_token& stop) const {
+bool ReplaySource::wait_until(TimeNs due_ns, const std::stop_token& stop) {
   for (TimeNs now_ns = clock_.now_ns(); now_ns < due_ns; now_ns = clock_.now_ns()) {
     if (stop.stop_requested()) {
       return false;
     }
+    heartbeat_.beat(now_ns);
     clock_.sleep_until(std::min(due_ns, now_ns + kStopSliceNs));
   }
   return true;

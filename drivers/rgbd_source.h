@@ -7,6 +7,7 @@
 #include "config/config.h"
 #include "core/clock.h"
 #include "core/frame_pool.h"
+#include "core/heartbeat.h"
 #include "core/result.h"
 
 namespace posed {
@@ -64,6 +65,12 @@ class RgbdSource {
 
   /// Thread-safe.
   virtual SourceHealth health() const { return {}; }
+
+  /// Beats at least ten times a second while `next` waits for a frame, so that who waits can be told from who hangs.
+  const Heartbeat& heartbeat() const { return heartbeat_; }
+
+ protected:
+  Heartbeat heartbeat_;
 };
 
 /// Opens the source that the configuration names. Errors: NotFound, BadData, InvalidArgument (size differs from the calibration).

@@ -52,6 +52,7 @@ class SyntheticSource final : public RgbdSource {
       return {
           .kind = CaptureKind::Failed, .frame = {}, .error = {ErrorCode::InvalidArgument, "the synthetic source was not started"}};
     }
+    heartbeat_.beat(clock_.now_ns());
     return pacing_ == Pacing::Realtime ? next_realtime(stop) : next_lockstep(stop);
   }
 
@@ -60,12 +61,13 @@ class SyntheticSource final : public RgbdSource {
   TimeNs due_ns(std::uint64_t index) const { return start_ns_ + camera_->due_ns(index); }
 
   /// False where the stop came first.
-  bool sleep_until(TimeNs deadline_ns, const std::stop_token& stop) const {
+  bool sleep_until(TimeNs deadline_ns, const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       const TimeNs now_ns = clock_.now_ns();
       if (now_ns >= deadline_ns) {
         return true;
       }
+      heartbeat_.beat(now_ns);
       clock_.sleep_until(std::min(deadline_ns, now_ns + kLongestSleep_ns));
     }
     return false;
@@ -118,6 +120,7 @@ class SyntheticSource final : public RgbdSource {
         writer.emplace(std::move(*free));
         break;
       }
+      heartbeat_.beat(clock_.now_ns());
       clock_.sleep_until(clock_.now_ns() + kSlotPoll_ns);
     }
     if (!writer) {

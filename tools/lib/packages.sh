@@ -30,6 +30,11 @@ posed_demo_packages=(
   "iproute2|ip, to look for a multicast route"
 )
 
+posed_package_packages=(
+  "dpkg-dev|libraries that a Debian package depends on"
+  "lintian|checks of Debian packages"
+)
+
 posed_test_packages=(
   "libgtest-dev|unit tests"
   "libgmock-dev|matchers and mocks"
@@ -44,4 +49,5 @@ posed_test_packages=(
   "python3-torch|tests of the training code"
   "python3-onnx|tests of the training code"
   "iproute2|network namespaces for the message tests"
+  "systemd|checks of the service's unit"
 )

@@ -1,5 +1,6 @@
 #include "daemon/supervisor.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -28,6 +29,7 @@ class FakeApp final : public App {
   bool can_save = true;
   int save_requests = 0;
   int stops = 0;
+  int applied = 0;
 
   const SourceInfo& source_info() const override { return info_; }
   Status start() override {
@@ -41,10 +43,50 @@ class FakeApp final : public App {
     ++save_requests;
     return can_save ? Status{} : make_error(ErrorCode::InvalidConfig, "map.file is empty");
   }
+  void apply(const Config&) override { ++applied; }
   std::optional<Se3> keyframe_pose(std::uint64_t) const override { return std::nullopt; }
 
  private:
   SourceInfo info_{.description = "fake app"};
+};
+
+/// Stands for systemd: receives what is noted while it lives.
+class NotifySocket {
+ public:
+  NotifySocket() : path_(std::filesystem::temp_directory_path() / ("posed_notify_" + std::to_string(getpid()))) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    EXPECT_LT(path_.string().size(), sizeof(address.sun_path));
+    path_.string().copy(address.sun_path, sizeof(address.sun_path) - 1);
+    EXPECT_EQ(bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+    setenv("NOTIFY_SOCKET", path_.c_str(), 1);
+  }
+  ~NotifySocket() {
+    unsetenv("NOTIFY_SOCKET");
+    close(fd_);
+    std::filesystem::remove(path_);
+  }
+  NotifySocket(const NotifySocket&) = delete;
+  NotifySocket& operator=(const NotifySocket&) = delete;
+
+  /// What has come since the call before.
+  std::vector<std::string> notes() const {
+    std::vector<std::string> notes;
+    char buffer[4096];
+    for (ssize_t n = recv(fd_, buffer, sizeof(buffer), 0); n >= 0; n = recv(fd_, buffer, sizeof(buffer), 0)) {
+      notes.emplace_back(buffer, static_cast<std::size_t>(n));
+    }
+    return notes;
+  }
+
+  bool noted(const std::string& what) const {
+    const std::vector<std::string> all = notes();
+    return std::any_of(all.begin(), all.end(), [&](const std::string& note) { return note.starts_with(what); });
+  }
+
+ private:
+  std::filesystem::path path_;
+  int fd_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
 };
 
 class SupervisorTest : public ::testing::Test {
@@ -116,6 +158,7 @@ TEST_F(SupervisorTest, OutlivesTheSourceOtherwise) {
       return app.health();
     }
     Status request_map_save() override { return app.request_map_save(); }
+    void apply(const Config& config) override { app.apply(config); }
     std::optional<Se3> keyframe_pose(std::uint64_t) const override { return std::nullopt; }
   } late(app_);
   Supervisor supervisor(options_);
@@ -131,35 +174,94 @@ TEST_F(SupervisorTest, APipelineThatCannotStartIsTheError) {
   EXPECT_EQ(end.error().message, "no threads left");
 }
 
-TEST_F(SupervisorTest, TellsSystemdWhenItIsReadyAndWhenItStops) {
-  const std::filesystem::path path = std::filesystem::temp_directory_path() / ("posed_notify_" + std::to_string(getpid()));
-  const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
-  ASSERT_GE(fd, 0);
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  ASSERT_LT(path.string().size(), sizeof(address.sun_path));
-  path.string().copy(address.sun_path, sizeof(address.sun_path) - 1);
-  ASSERT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
-  setenv("NOTIFY_SOCKET", path.c_str(), 1);
+TEST_F(SupervisorTest, SigHupReadsTheConfigurationAgainAndEndsNothing) {
+  options_.exit_at_end = true;
+  int reloads = 0;
+  options_.reload = [&](App& app) {
+    ++reloads;
+    app.apply(Config{});
+  };
+  app_.finished = true;
+  app_.on_start = [] { kill(getpid(), SIGHUP); };
+  Supervisor supervisor(options_);
+  EXPECT_EQ(supervisor.run(app_).value(), RunEnd::SourceEnded);
+  EXPECT_EQ(reloads, 1);
+  EXPECT_EQ(app_.applied, 1);
+}
 
+TEST_F(SupervisorTest, TellsSystemdWhenItIsReadyAndWhenItStops) {
+  const NotifySocket systemd;
   options_.exit_at_end = true;
   app_.finished = true;
   app_.report.state = TrackingState::Tracking;
+  app_.report.frames_tracked = 1;
   Supervisor supervisor(options_);
   EXPECT_TRUE(supervisor.run(app_));
-
-  unsetenv("NOTIFY_SOCKET");
-  std::vector<std::string> notes;
-  char buffer[4096];
-  for (ssize_t n = recv(fd, buffer, sizeof(buffer), 0); n >= 0; n = recv(fd, buffer, sizeof(buffer), 0)) {
-    notes.emplace_back(buffer, static_cast<std::size_t>(n));
-  }
-  close(fd);
-  std::filesystem::remove(path);
+  const std::vector<std::string> notes = systemd.notes();
   ASSERT_GE(notes.size(), 3U);
   EXPECT_EQ(notes[0], "READY=1\nSTATUS=running: fake app");
   EXPECT_EQ(notes[1], "STATUS=tracking");
   EXPECT_EQ(notes[2], "STOPPING=1\nSTATUS=stopping");
+}
+
+TEST_F(SupervisorTest, IsReadyWhenTheWaitForTheCameraBegins) {
+  const NotifySocket systemd;
+  options_.exit_at_end = true;
+  app_.finished = true;
+  app_.report.source.connected = false;
+  Supervisor supervisor(options_);
+  EXPECT_TRUE(supervisor.run(app_));
+  EXPECT_TRUE(systemd.noted("READY=1"));
+}
+
+TEST_F(SupervisorTest, IsNotReadyBeforeAFrameWasProcessed) {
+  const NotifySocket systemd;
+  options_.exit_at_end = true;
+  app_.finished = true;
+  Supervisor supervisor(options_);
+  EXPECT_TRUE(supervisor.run(app_));
+  EXPECT_FALSE(systemd.noted("READY=1"));
+}
+
+TEST_F(SupervisorTest, FeedsTheWatchdogWhileCaptureAndTrackingMove) {
+  struct Case {
+    ThreadProgress progress;
+    bool fed;
+  };
+  for (const Case& c :
+       {Case{{}, true}, Case{{.capture_ns = 11 * kNsPerSecond}, false}, Case{{.tracker_ns = 4 * kNsPerSecond}, false},
+        Case{{.mapper_ns = 999 * kNsPerSecond}, true}, Case{{.detector_ns = 999 * kNsPerSecond}, true}}) {
+    const NotifySocket systemd;
+    setenv("WATCHDOG_USEC", "5000000", 1);
+    setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
+    FakeApp app;
+    app.finished = true;
+    app.report.progress = c.progress;
+    options_.exit_at_end = true;
+    Supervisor supervisor(options_);
+    EXPECT_TRUE(supervisor.run(app));
+    unsetenv("WATCHDOG_USEC");
+    unsetenv("WATCHDOG_PID");
+    EXPECT_EQ(systemd.noted("WATCHDOG=1"), c.fed);
+  }
+}
+
+TEST(ProgressWatchTest, TellsOfEachChangeOnceAndNamesWhoIsStuck) {
+  ProgressWatch watch;
+  EXPECT_TRUE(watch.look({.mapper_ns = ProgressWatch::kMapperDeadline_ns}).empty());
+  const ThreadProgress stuck{.mapper_ns = ProgressWatch::kMapperDeadline_ns + 1,
+                             .publisher_ns = ProgressWatch::kPublisherDeadline_ns + 1};
+  const std::vector<ProgressWatch::Change> changes = watch.look(stuck);
+  ASSERT_EQ(changes.size(), 2U);
+  EXPECT_EQ(changes[0].thread, "mapper");
+  EXPECT_TRUE(changes[0].stuck);
+  EXPECT_EQ(watch.stuck(), "mapper,publisher");
+  EXPECT_TRUE(watch.makes_progress());
+  EXPECT_TRUE(watch.look(stuck).empty());
+  const std::vector<ProgressWatch::Change> again = watch.look({});
+  ASSERT_EQ(again.size(), 2U);
+  EXPECT_FALSE(again[0].stuck);
+  EXPECT_EQ(watch.stuck(), "");
 }
 
 TEST_F(SupervisorTest, TakesSourceErrorsWithoutEverBlocking) {
