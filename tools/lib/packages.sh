@@ -35,6 +35,10 @@ posed_package_packages=(
   "lintian|checks of Debian packages"
 )
 
+posed_fuzz_packages=(
+  "clang|compiler with libFuzzer"
+)
+
 posed_test_packages=(
   "libgtest-dev|unit tests"
   "libgmock-dev|matchers and mocks"
