@@ -101,7 +101,7 @@ struct PublisherConfig {
   bool bot_core_pose = false;   ///< also publish bot_core.pose_t of base, on <prefix>BOT_POSE
 };
 
-enum class ThreadPolicyName { Normal, Fifo };
+enum class ThreadPolicyName { Normal, Fifo, Deadline };
 
 struct ThreadConfig {
   ThreadPolicyName policy = ThreadPolicyName::Normal;
@@ -114,6 +114,7 @@ struct PipelineConfig {
   int frame_queue = 2;     ///< frames waiting for the tracker before the oldest is dropped
   int keyframe_queue = 4;  ///< keyframes waiting for the mapper before none is made
   int publish_queue = 64;  ///< poses waiting for the publisher before the oldest is dropped
+  bool lock_memory = false;
   ThreadConfig capture;
   ThreadConfig tracker;
   ThreadConfig mapper;

@@ -76,6 +76,8 @@ void check_thread(StrictReader& reader, const std::string& section, const Thread
   const std::string priority = section + ".priority";
   reader.require(thread.policy != ThreadPolicyName::Fifo || thread.priority >= 1, {priority, policy},
                  fmt::format("policy \"fifo\" needs {} from 1 to 99", priority));
+  reader.require(thread.policy != ThreadPolicyName::Deadline || section == "pipeline.detector", {policy},
+                 "\"deadline\" is for the detector alone: it would take the processor away from every other thread");
 }
 
 /// ORB describes a patch of 31 x 31 pixels, and FAST looks 3 pixels around a corner: nothing fits into a smaller image.

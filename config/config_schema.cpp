@@ -161,10 +161,16 @@ void add_publisher(SchemaBuilder& schema, PublisherConfig& c) {
 void add_thread(SchemaBuilder& schema, const std::string& thread, std::string_view description, ThreadConfig& c) {
   constexpr int kMaxCpus = 1024;  // glibc's CPU_SETSIZE
   schema.section("pipeline." + thread, description)
-      .key("policy", choice(c.policy, {{"normal", ThreadPolicyName::Normal}, {"fifo", ThreadPolicyName::Fifo}}), "",
-           "Scheduling: `normal`, or `fifo` for SCHED_FIFO, which needs the permission (CAP_SYS_NICE or an rtprio limit). Where it "
-           "is refused the thread "
-           "runs as `normal`, with a warning.")
+      .key("policy",
+           choice(
+               c.policy,
+               {{"normal", ThreadPolicyName::Normal}, {"fifo", ThreadPolicyName::Fifo}, {"deadline", ThreadPolicyName::Deadline}}),
+           "",
+           "Scheduling: `normal`; `fifo` for SCHED_FIFO, which needs the permission (CAP_SYS_NICE or an rtprio limit); `deadline`, "
+           "for the "
+           "detector alone, for SCHED_DEADLINE, half of one processor in slices of `detector.budget_s`, which needs CAP_SYS_NICE "
+           "and "
+           "no `cpus`. Where it is refused the thread runs as `normal`, with a warning.")
       .key("priority", integer(c.priority, 0, 99), "", "For `fifo`, 1 (low) to 99; `normal` ignores it.")
       .key("cpus", IntegerListField{&c.cpus, 0, kMaxCpus - 1, kMaxCpus}, "", "Processors that the thread may run on; empty: all.");
 }
@@ -178,7 +184,11 @@ void add_pipeline(SchemaBuilder& schema, PipelineConfig& c) {
       .key("keyframe_queue", integer(c.keyframe_queue, 1, 64), "keyframes",
            "Keyframes that wait for the mapper; while it is full the tracker makes none.")
       .key("publish_queue", integer(c.publish_queue, 1, 4096), "poses",
-           "Poses that wait for the publisher; when full the oldest is dropped.");
+           "Poses that wait for the publisher; when full the oldest is dropped.")
+      .key("lock_memory", BoolField{&c.lock_memory}, "",
+           "Keep all memory in RAM, so that no page fault delays a pose. Needs an infinite limit on locked memory, which the "
+           "service "
+           "has; where it is refused the daemon runs on without, with a warning.");
   add_thread(schema, "capture", "The thread that takes frames from the source.", c.capture);
   add_thread(schema, "tracker", "The thread that computes poses.", c.tracker);
   add_thread(schema, "mapper", "The thread that keeps the map.", c.mapper);

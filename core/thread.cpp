@@ -6,8 +6,10 @@
 #include <pthread.h>
 #include <sched.h>
 #include <system_error>
+#include <unistd.h>
 
 #include <fmt/ranges.h>
+#include <sys/syscall.h>
 
 #include "core/logging.h"
 
@@ -29,8 +31,36 @@ std::string describe(int error) {
   return std::generic_category().message(error);
 }
 
+/// As the kernel defines it (sched_setattr(2)); the C library of Debian 12 has neither the struct nor the call.
+struct SchedulingAttributes {
+  std::uint32_t size = sizeof(SchedulingAttributes);
+  std::uint32_t policy = SCHED_OTHER;
+  std::uint64_t flags = 0;
+  std::int32_t nice = 0;
+  std::uint32_t priority = 0;
+  std::uint64_t runtime_ns = 0;
+  std::uint64_t deadline_ns = 0;
+  std::uint64_t period_ns = 0;
+};
+
+/// 0 or an errno.
+int apply_deadline(const ThreadOptions& options) {
+  constexpr std::uint32_t kDeadlinePolicy = 6;  // SCHED_DEADLINE
+  constexpr std::uint64_t kResetOnFork = 1;     // SCHED_FLAG_RESET_ON_FORK: a thread of this kind may start no other without it
+  SchedulingAttributes attributes;
+  attributes.policy = kDeadlinePolicy;
+  attributes.flags = kResetOnFork;
+  attributes.runtime_ns = static_cast<std::uint64_t>(options.runtime_ns);
+  attributes.deadline_ns = static_cast<std::uint64_t>(options.period_ns);
+  attributes.period_ns = static_cast<std::uint64_t>(options.period_ns);
+  return syscall(SYS_sched_setattr, 0, &attributes, 0U) == 0 ? 0 : errno;
+}
+
 /// 0 or an errno.
 int apply_policy(const ThreadOptions& options) {
+  if (options.policy == SchedulingPolicy::Deadline) {
+    return apply_deadline(options);
+  }
   sched_param parameters{};
   if (options.policy == SchedulingPolicy::Fifo) {
     parameters.sched_priority = options.priority;
@@ -64,14 +94,22 @@ int apply_affinity(const std::vector<int>& cpus) {
   return pthread_setaffinity_np(pthread_self(), sizeof(set), &set);
 }
 
+std::string policy_text(const ThreadOptions& options) {
+  switch (options.policy) {
+    case SchedulingPolicy::Fifo: return fmt::format("SCHED_FIFO priority {}", options.priority);
+    case SchedulingPolicy::Deadline:
+      return fmt::format("SCHED_DEADLINE {:.1f} of {:.1f} ms", to_ms(options.runtime_ns), to_ms(options.period_ns));
+    case SchedulingPolicy::Normal: break;
+  }
+  return "SCHED_OTHER";
+}
+
 }  // namespace
 
 Status apply_thread_options(const ThreadOptions& options) {
   std::vector<std::string> refused;
   if (const int error = apply_policy(options); error != 0) {
-    refused.push_back(options.policy == SchedulingPolicy::Fifo
-                          ? fmt::format("SCHED_FIFO priority {} ({})", options.priority, describe(error))
-                          : fmt::format("SCHED_OTHER ({})", describe(error)));
+    refused.push_back(fmt::format("{} ({})", policy_text(options), describe(error)));
   }
   if (const int error = apply_affinity(options.cpus); error != 0) {
     refused.push_back(fmt::format("processors {} ({})", fmt::join(options.cpus, ","), describe(error)));

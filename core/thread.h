@@ -6,20 +6,24 @@
 #include <thread>
 #include <vector>
 
+#include "core/clock.h"
 #include "core/result.h"
 
 namespace posed {
 
 enum class SchedulingPolicy {
-  Normal,  ///< the system's time sharing, also where the starting thread is a real-time one
-  Fifo,    ///< SCHED_FIFO
+  Normal,    ///< the system's time sharing, also where the starting thread is a real-time one
+  Fifo,      ///< SCHED_FIFO
+  Deadline,  ///< SCHED_DEADLINE: `runtime_ns` of processor time in every `period_ns`, before all other policies
 };
 
 /// How a thread is to run. What the system refuses degrades with one warning in the log, never with an error.
 struct ThreadOptions {
   std::string name;  ///< shown by ps and top; the kernel keeps 15 characters
   SchedulingPolicy policy = SchedulingPolicy::Normal;
-  int priority = 0;            ///< 1 to 99 for Fifo; ignored for Normal
+  int priority = 0;            ///< 1 to 99 for Fifo; ignored otherwise
+  TimeNs runtime_ns = 0;       ///< for Deadline
+  TimeNs period_ns = 0;        ///< for Deadline, and the deadline
   std::vector<int> cpus = {};  ///< empty: those of the thread that starts it
 };
 

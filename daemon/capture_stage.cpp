@@ -3,6 +3,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/memory_lock.h"
+
 namespace posed {
 
 CaptureStage::CaptureStage(RgbdSource& source, FramePool& pool, std::function<void(const Error&)> on_error)
@@ -59,6 +61,7 @@ void CaptureStage::run(const std::stop_token& stop, FrameLink& out, NewestFrameL
         dropped_.add();
       }
       out.notify_arrived();
+      page_faults_.set(static_cast<std::int64_t>(thread_page_faults()));
     }
   }
   running_.store(false, std::memory_order_relaxed);
@@ -79,6 +82,7 @@ void CaptureStage::report(HealthReport& health) const {
   health.frames_missed = missed_.value();
   health.frames_no_slot = no_slot_.value();
   health.frames_dropped = dropped_.value();
+  health.capture_page_faults = static_cast<std::uint64_t>(page_faults_.value());
 }
 
 void CaptureStage::count_missed(std::uint64_t sequence) {

@@ -48,6 +48,7 @@ class CaptureStage {
   Counter no_slot_;
   Counter dropped_;
   Counter missed_;
+  Gauge page_faults_;
   std::uint64_t next_sequence_ = 0;
   std::uint64_t explained_gap_ = 0;  // frames since the last delivered one that were skipped or had no slot
   std::atomic<bool> running_{false};

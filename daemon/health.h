@@ -66,6 +66,8 @@ struct HealthReport {
   LatencySummary detect;          ///< time in the detector a frame, those given up included
   LatencySummary detect_overrun;  ///< past the budget, of the frames that took longer
   std::uint64_t peak_rss_bytes = 0;
+  std::uint64_t capture_page_faults = 0;  ///< of the capture thread, in real time
+  std::uint64_t tracker_page_faults = 0;
 };
 
 }  // namespace posed

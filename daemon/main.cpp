@@ -13,6 +13,7 @@
 #include "config/config_loader.h"
 #include "config/config_reload.h"
 #include "core/logging.h"
+#include "core/memory_lock.h"
 #include "daemon/app.h"
 #include "daemon/exit_code.h"
 #include "daemon/supervisor.h"
@@ -67,6 +68,11 @@ int run_daemon(Config config, const Arguments& arguments) {
   }
   Supervisor supervisor(supervisor_options);
 
+  if (config.pipeline.lock_memory) {
+    if (const Status locked = lock_memory(); !locked) {
+      log_warning("{}; running on without", locked.error().message);
+    }
+  }
   AppOptions app_options;
   app_options.on_source_error = supervisor.source_error_sink();
   const Result<std::unique_ptr<App>> app = App::create(config, std::move(app_options), SystemClock::instance());

@@ -174,6 +174,8 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.detections_abandoned = count(health.detections_abandoned);
   message.detections_dropped = count(health.detections_dropped);
   message.detector_errors = count(health.detector_errors);
+  message.capture_page_faults = count(health.capture_page_faults);
+  message.tracker_page_faults = count(health.tracker_page_faults);
   message.peak_rss_bytes = count(health.peak_rss_bytes);
   message.track = to_message(health.track);
   message.latency = to_message(health.latency);

@@ -32,7 +32,17 @@ std::size_t size_of(int configured) {
 
 ThreadOptions thread_options(std::string name, const ThreadConfig& config) {
   const SchedulingPolicy policy = config.policy == ThreadPolicyName::Fifo ? SchedulingPolicy::Fifo : SchedulingPolicy::Normal;
-  return {std::move(name), policy, config.priority, config.cpus};
+  return {.name = std::move(name), .policy = policy, .priority = config.priority, .cpus = config.cpus};
+}
+
+ThreadOptions detector_thread_options(const Config& config) {
+  ThreadOptions options = thread_options("detector", config.pipeline.detector);
+  if (config.pipeline.detector.policy == ThreadPolicyName::Deadline) {
+    options.policy = SchedulingPolicy::Deadline;
+    options.runtime_ns = from_seconds(config.detector.budget_s);
+    options.period_ns = 2 * options.runtime_ns;
+  }
+  return options;
 }
 
 constexpr std::size_t kDetectionsQueue = 8;  // frames; a publisher that is further behind shows only the newest
@@ -214,8 +224,7 @@ class Pipeline final : public App {
       mapping_.run(stop, [this] { mark_drained(keyframes_drained_); });
     });
     if (detection_.is_enabled()) {
-      threads_[2] =
-          NamedThread(thread_options("detector", pipeline.detector), [this](const std::stop_token& stop) { detection_.run(stop); });
+      threads_[2] = NamedThread(detector_thread_options(config_), [this](const std::stop_token& stop) { detection_.run(stop); });
     } else {
       detection_.close_output();
     }

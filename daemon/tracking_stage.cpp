@@ -3,6 +3,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/memory_lock.h"
+
 namespace posed {
 
 TrackingStage::TrackingStage(FrameTracker& tracker, Links links, const Clock& clock, FullQueue full_queue,
@@ -38,6 +40,7 @@ void TrackingStage::track(const RgbdFrame& frame, const std::stop_token& stop) {
     on_tracked_({frame, estimate, tracker_.last_mask(), tracker_.last_features()});
   }
   hand_on(estimate, stop);
+  page_faults_.set(static_cast<std::int64_t>(thread_page_faults()));
 }
 
 void TrackingStage::hand_on(const PoseEstimate& estimate, const std::stop_token& stop) {
@@ -77,6 +80,7 @@ void TrackingStage::report(HealthReport& health) const {
   health.keyframes = keyframes_.value();
   health.keyframes_delayed = keyframes_delayed_.value();
   health.poses_dropped = poses_dropped_.value();
+  health.tracker_page_faults = static_cast<std::uint64_t>(page_faults_.value());
   health.track = track_time_.summary();
 }
 

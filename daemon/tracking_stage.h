@@ -69,6 +69,7 @@ class TrackingStage {
   Counter keyframes_;
   Counter keyframes_delayed_;
   Counter poses_dropped_;
+  Gauge page_faults_;
   Heartbeat heartbeat_;
   LatencyHistogram track_time_;
 };

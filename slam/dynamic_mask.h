@@ -112,7 +112,6 @@ class DynamicMask {
   std::size_t taken_ = 0;
   std::array<Mover, kMostMovers> movers_;
   std::uint64_t last_detection_ = 0;  // sequence number + 1 of the frame; 0: none
-  std::int64_t last_detection_stamp_ns_ = 0;
   std::vector<CellEvidence> evidence_;
   std::vector<std::uint8_t> carried_;  // one detection on its way to the present
   std::vector<std::uint8_t> carried_2_;

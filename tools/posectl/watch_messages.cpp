@@ -60,6 +60,8 @@ HealthReport from_status_message(const status_t& message) {
   health.state = state_of(message.state);
   health.source_failed = message.source_failed != 0;
   health.source_ended = message.source_ended != 0;
+  health.capture_page_faults = count_of(message.capture_page_faults);
+  health.tracker_page_faults = count_of(message.tracker_page_faults);
   health.source.connected = message.source_connected != 0;
   health.source.reconnects = count_of(message.source_reconnects);
   health.source.stalls = count_of(message.source_stalls);

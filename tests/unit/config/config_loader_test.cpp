@@ -226,7 +226,8 @@ TEST_F(ConfigLoader, UnknownKeysGetTheNearestKnownOne) {
   EXPECT_EQ(error_of("quux = 1"), "posed.toml:1:1: quux: 1: unknown key; allowed are only keys in tables, such as [tracker]");
   EXPECT_EQ(
       error_of("[pipeline]\nqueues = 3"),
-      "posed.toml:2:1: pipeline.queues: 3: unknown key; allowed here: frame_slots, frame_queue, keyframe_queue, publish_queue");
+      "posed.toml:2:1: pipeline.queues: 3: unknown key; allowed here: frame_slots, frame_queue, keyframe_queue, publish_queue, "
+      "lock_memory");
 }
 
 TEST_F(ConfigLoader, UnknownTablesAreReportedOnce) {
@@ -315,6 +316,13 @@ TEST_F(ConfigLoader, CamerasNeedDepthAndDoNotWait) {
       parse_config("source.kind = \"openni2\"\nsource.pacing = \"lockstep\"\nsource.openni2.device = \"a.oni\"", "posed.toml"));
   EXPECT_EQ(error_of("source.v4l2.controls = [\"gain=3\", \"exposure\"]"),
             "posed.toml:1:35: source.v4l2.controls: \"exposure\": element 2 of 2: not allowed, must be a text NAME=VALUE");
+}
+
+TEST_F(ConfigLoader, DeadlineSchedulingIsForTheDetector) {
+  EXPECT_TRUE(parse_config("pipeline.detector.policy = \"deadline\"", "posed.toml"));
+  EXPECT_EQ(error_of("pipeline.tracker.policy = \"deadline\""),
+            "posed.toml:1:27: pipeline.tracker.policy: \"deadline\": \"deadline\" is for the detector alone: it would take the "
+            "processor away from every other thread");
 }
 
 TEST_F(ConfigLoader, GpioLinesDiffer) {

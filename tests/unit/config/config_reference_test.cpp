@@ -123,6 +123,9 @@ void satisfy_rules(Config& c) {
   for (ThreadConfig* thread :
        {&c.pipeline.capture, &c.pipeline.tracker, &c.pipeline.mapper, &c.pipeline.detector, &c.pipeline.publisher}) {
     thread->priority = std::max(thread->priority, 1);
+    if (thread->policy == ThreadPolicyName::Deadline && thread != &c.pipeline.detector) {
+      thread->policy = ThreadPolicyName::Fifo;
+    }
   }
 }
 

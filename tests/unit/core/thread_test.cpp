@@ -158,6 +158,23 @@ TEST(ThreadOptions, FifoIsGrantedOrRefusedWithAReason) {
   }
 }
 
+TEST(ThreadOptions, DeadlineIsGrantedOrRefusedWithAReason) {
+  constexpr int kDeadlinePolicy = 6;  // SCHED_DEADLINE
+  int policy = SCHED_OTHER;
+  const Status status = on_own_thread([&] {
+    Status applied = apply_thread_options(
+        {.name = "slices", .policy = SchedulingPolicy::Deadline, .runtime_ns = 5 * kNsPerMs, .period_ns = 100 * kNsPerMs});
+    policy = sched_getscheduler(0) & 0xFF;  // without SCHED_RESET_ON_FORK
+    return applied;
+  });
+  if (status) {
+    EXPECT_EQ(policy, kDeadlinePolicy);
+  } else {
+    EXPECT_EQ(policy, SCHED_OTHER);
+    EXPECT_THAT(status.error().message, HasSubstr("SCHED_DEADLINE 5.0 of 100.0 ms ("));
+  }
+}
+
 TEST(ThreadOptions, NormalIsNotInheritedFromARealTimeThread) {
   int inner_policy = -1;
   const bool real_time = on_own_thread([&] {
