@@ -23,6 +23,7 @@ void add_synth_command(CLI::App& parent, const Console& console, int& exit_code)
 void add_detect_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_model_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_check_config_command(CLI::App& parent, const Console& console, int& exit_code);
+void add_doctor_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_bench_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_version_command(CLI::App& parent, const Console& console, int& exit_code);
 

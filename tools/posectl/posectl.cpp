@@ -29,6 +29,7 @@ int parse_and_run(std::vector<std::string> arguments, const Console& console) {
   add_detect_command(app, console, exit_code);
   add_model_command(app, console, exit_code);
   add_check_config_command(app, console, exit_code);
+  add_doctor_command(app, console, exit_code);
   add_bench_command(app, console, exit_code);
   add_version_command(app, console, exit_code);
   // CLI11 takes a vector from its back.
