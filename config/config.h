@@ -46,6 +46,7 @@ struct SourceConfig {
   V4l2Config v4l2;
   LibcameraConfig libcamera;
   DepthNodeConfig depth;
+  std::vector<std::string> faults;  ///< put into a recording or the rendered world: drivers/fault_injection.h
 };
 
 struct CameraConfig {

@@ -29,6 +29,8 @@ void check_cameras(StrictReader& reader, const SourceConfig& source) {
                  "needs source.v4l2.device, the node of the colour camera");
   reader.require(!without_depth || !source.depth.node.device.empty(), {"source.kind", "source.depth.device"},
                  "a colour camera alone cannot be tracked in metres: set source.depth.device, the node of a depth camera");
+  reader.require(source.faults.empty() || source.kind == SourceKind::Synthetic || source.kind == SourceKind::Replay,
+                 {"source.faults", "source.kind"}, "only a recording and the rendered world take faults; a camera has its own");
   reader.require(source.pacing != Pacing::Lockstep || !is_camera(source), {"source.pacing", "source.kind"},
                  "a camera does not wait: \"lockstep\" is for recordings and the rendered world");
 }

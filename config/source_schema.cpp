@@ -14,6 +14,7 @@ bool is_control(std::string_view text) {
 constexpr TextRule kDevicePath = {"the path of a device, or \"\"", is_path};
 constexpr TextRule kControl = {"a text NAME=VALUE", is_control};
 constexpr std::size_t kMaxControls = 64;
+constexpr std::size_t kMaxFaults = 256;
 
 void add_recorded(SchemaBuilder& schema, SourceConfig& c) {
   schema.section("source.replay", "A recording in the TUM RGB-D layout, for `kind = \"replay\"`.")
@@ -114,6 +115,9 @@ void add_source(SchemaBuilder& schema, SourceConfig& c) {
       .key("pacing", choice(c.pacing, {{"realtime", Pacing::Realtime}, {"lockstep", Pacing::Lockstep}}), "",
            "`realtime` delivers frames when their stamps say and drops what cannot be kept up with; `lockstep` processes every "
            "frame, as fast as possible, and repeats exactly: for recordings and the rendered world.");
+  schema.key("faults", TextListField{&c.faults, {"KIND FIRST-LAST [AMOUNT]", is_path}, kMaxFaults}, "",
+             "Faults of a camera to put into a recording or the rendered world, for tests, as `black 120-150`: drop, thin N, "
+             "duplicate, freeze, black, white, zero_depth, nan_depth, half, stamp SECONDS; frames by number.");
   add_recorded(schema, c);
   add_cameras(schema, c);
 }

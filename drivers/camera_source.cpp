@@ -9,13 +9,14 @@
 
 #include <fmt/format.h>
 
+#include "drivers/frame_guard.h"
+
 namespace posed {
 
 namespace {
 
 constexpr TimeNs kLook_ns = 20 * kNsPerMs;        // between looks at the stop token
 constexpr TimeNs kFirstRetry_ns = 50 * kNsPerMs;  // doubled with each attempt
-constexpr TimeNs kFuture_ns = 5 * kNsPerMs;       // a stamp may be ahead of the clock by so much
 constexpr std::uint64_t kLargestGap = 1000;       // frames; more is a count that began anew
 
 class CameraSource final : public RgbdSource {
@@ -27,7 +28,7 @@ class CameraSource final : public RgbdSource {
              .height = options.height,
              .rate_hz = options.live.rate_hz,
              .total_frames = 0,
-             .slots_held = 1};
+             .slots_held = 2};
   }
 
   ~CameraSource() override { camera_->close(); }
@@ -111,26 +112,21 @@ class CameraSource final : public RgbdSource {
     note_delivery();
     RgbdFrame& frame = *writer;
     const TimeNs now_ns = clock_.now_ns();
-    if (frame.capture_ns > now_ns + kFuture_ns) {
-      return skip(fmt::format("a frame's stamp is {:.3f} s in the future", to_seconds(frame.capture_ns - now_ns)));
+    if (std::optional<std::string> reason = guard_.judge(frame, now_ns)) {
+      return {CaptureKind::SkippedFrame, {}, {ErrorCode::BadData, std::move(*reason)}};
     }
-    if (frame.capture_ns <= last_capture_ns_) {
-      return skip(fmt::format("a frame's stamp is {:.6f} s before that of the frame before it",
-                              to_seconds(last_capture_ns_ - frame.capture_ns)));
-    }
-    last_capture_ns_ = frame.capture_ns;
     frame.sequence = count(frame.sequence);
     last_stamp_utc_ns_ = std::max(last_stamp_utc_ns_ + 1, clock_.utc_ns(frame.capture_ns));
     frame.stamp_utc_ns = last_stamp_utc_ns_;
-    return {CaptureKind::Frame, std::move(writer).share(), {}};
+    FrameRef shared = std::move(writer).share();
+    guard_.remember(shared);
+    return {CaptureKind::Frame, std::move(shared), {}};
   }
 
   Capture delivered_nowhere() {
     note_delivery();
     return {CaptureKind::NoFreeSlot, {}, {}};
   }
-
-  static Capture skip(std::string reason) { return {CaptureKind::SkippedFrame, {}, {ErrorCode::BadData, std::move(reason)}}; }
 
   void note_delivery() {
     last_frame_ns_ = clock_.now_ns();
@@ -190,7 +186,7 @@ class CameraSource final : public RgbdSource {
   TimeNs wait_ns_ = kFirstRetry_ns;
   std::string told_;  // the last reason why there is no frame
   TimeNs last_frame_ns_ = 0;
-  TimeNs last_capture_ns_ = std::numeric_limits<TimeNs>::min();
+  FrameGuard guard_;
   std::int64_t last_stamp_utc_ns_ = std::numeric_limits<std::int64_t>::min();
   std::optional<std::uint64_t> device_sequence_;  // of the newest frame since the camera was opened
   std::uint64_t next_sequence_ = 0;

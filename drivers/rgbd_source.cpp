@@ -1,9 +1,13 @@
 #include "drivers/rgbd_source.h"
 
+#include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "drivers/fault_injection.h"
 #include "drivers/replay_source.h"
 #include "drivers/synthetic_source.h"
 #ifdef POSED_HAS_OPENNI2
@@ -25,10 +29,8 @@ namespace {
                     fmt::format("source.kind = \"{}\": this build was made without it (CMake option {})", kind, option));
 }
 
-}  // namespace
-
-Result<std::unique_ptr<RgbdSource>> make_rgbd_source(const SourceConfig& config, const CameraIntrinsics& camera,
-                                                     const Clock& clock) {
+Result<std::unique_ptr<RgbdSource>> make_sound_source(const SourceConfig& config, const CameraIntrinsics& camera,
+                                                      const Clock& clock) {
   switch (config.kind) {
     case SourceKind::Replay: return make_replay_source(config, camera, clock);
     case SourceKind::Synthetic: return make_synthetic_source(config, camera, clock);
@@ -52,6 +54,25 @@ Result<std::unique_ptr<RgbdSource>> make_rgbd_source(const SourceConfig& config,
 #endif
   }
   return make_error(ErrorCode::InvalidArgument, "source.kind has no meaning");
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RgbdSource>> make_rgbd_source(const SourceConfig& config, const CameraIntrinsics& camera,
+                                                     const Clock& clock) {
+  std::vector<Fault> faults;
+  for (const std::string& text : config.faults) {
+    const Result<Fault> fault = parse_fault(text);
+    if (!fault) {
+      return tl::unexpected(fault.error());
+    }
+    faults.push_back(*fault);
+  }
+  Result<std::unique_ptr<RgbdSource>> source = make_sound_source(config, camera, clock);
+  if (!source || faults.empty()) {
+    return source;
+  }
+  return with_faults(std::move(*source), std::move(faults), clock);
 }
 
 }  // namespace posed

@@ -61,7 +61,8 @@ std::unordered_map<KeyframeId, double> paths_m(const Map& map, KeyframeId from) 
   std::priority_queue<Reached, std::vector<Reached>, std::greater<>> front;
   front.emplace(0.0, from);
   while (!front.empty()) {
-    const auto [length, id] = front.top();
+    const double length = front.top().first;  // no structured binding: clang 14 lets no lambda capture one
+    const KeyframeId id = front.top().second;
     front.pop();
     if (!length_m.emplace(id, length).second) {
       continue;
