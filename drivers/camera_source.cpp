@@ -119,7 +119,8 @@ class CameraSource final : public RgbdSource {
     }
     last_capture_ns_ = frame.capture_ns;
     frame.sequence = count(frame.sequence);
-    last_stamp_utc_ns_ = std::max(last_stamp_utc_ns_ + 1, clock_.utc_ns(frame.capture_ns));
+    const std::int64_t utc_ns = frame.stamp_utc_ns != 0 ? frame.stamp_utc_ns : clock_.utc_ns(frame.capture_ns);
+    last_stamp_utc_ns_ = std::max(last_stamp_utc_ns_ + 1, utc_ns);
     frame.stamp_utc_ns = last_stamp_utc_ns_;
     return {CaptureKind::Frame, std::move(writer).share(), {}};
   }
