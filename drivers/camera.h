@@ -43,7 +43,8 @@ class Camera {
   virtual Status open() = 0;
 
   /// Waits at most `timeout_ns` for the next frame and writes its pixels, `capture_ns`, and as `sequence` the device's own count,
-  /// whose gaps are frames lost (from any number on). A null `frame` takes the frame and lets it go. Does not allocate.
+  /// whose gaps are frames lost (from any number on). `stamp_utc_ns` is left at 0 but for recordings that bring their own. A null
+  /// `frame` takes the frame and lets it go. Does not allocate.
   virtual CameraRead read(RgbdFrame* frame, TimeNs timeout_ns) = 0;
 
   /// Ends streaming and gives everything of the device back. Nothing happens where it is closed.

@@ -116,7 +116,8 @@ class CameraSource final : public RgbdSource {
       return {CaptureKind::SkippedFrame, {}, {ErrorCode::BadData, std::move(*reason)}};
     }
     frame.sequence = count(frame.sequence);
-    last_stamp_utc_ns_ = std::max(last_stamp_utc_ns_ + 1, clock_.utc_ns(frame.capture_ns));
+    const std::int64_t utc_ns = frame.stamp_utc_ns != 0 ? frame.stamp_utc_ns : clock_.utc_ns(frame.capture_ns);
+    last_stamp_utc_ns_ = std::max(last_stamp_utc_ns_ + 1, utc_ns);
     frame.stamp_utc_ns = last_stamp_utc_ns_;
     FrameRef shared = std::move(writer).share();
     guard_.remember(shared);

@@ -24,6 +24,7 @@ posed_build_packages=(
   "libonnx-dev|ONNX message classes"
   "libprotobuf-dev|Protocol Buffers, which ONNX files are"
   "libopencv-dnn-dev|second engine for networks"
+  "libopenni2-dev|cameras by OpenNI2"
 )
 
 posed_demo_packages=(
