@@ -15,12 +15,12 @@ case_vivid_streams() {
 
 # gpio-sim shows what gpioset drives, and gpioget reads what it pulls.
 case_gpio_sim_lines() {
-  plug_gpio 8
+  plug_gpio
   gpioset -m signal "$gpio_chip" 0=1 &
   wait_until 5 grep -qx 1 "$gpio_lines/sim_gpio0/value" || fail "the line that gpioset drives stays low"
   local level
   for level in up down up; do
-    echo "pull-$level" >"$gpio_lines/sim_gpio3/pull"
+    pull 3 $level
     [ "$(gpioget "$gpio_chip" 3)" = "$([ $level = up ] && echo 1 || echo 0)" ] || fail "gpioget does not see pull-$level"
   done
 }
