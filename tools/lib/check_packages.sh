@@ -4,7 +4,8 @@ set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/../.."
 source tools/lib/packages.sh
 
-installed=$(printf '%s\n' "${posed_build_packages[@]%%|*}" "${posed_demo_packages[@]%%|*}" "${posed_package_packages[@]%%|*}" "${posed_fuzz_packages[@]%%|*}" "${posed_test_packages[@]%%|*}" | LC_ALL=C sort -u)
+installed=$(printf '%s\n' "${posed_build_packages[@]%%|*}" "${posed_demo_packages[@]%%|*}" "${posed_package_packages[@]%%|*}" "${posed_fuzz_packages[@]%%|*}" "${posed_test_packages[@]%%|*}" \
+  "${posed_vm_packages[@]%%|*}" | LC_ALL=C sort -u)
 # The first cell of a table's row, where it is a name in backquotes.
 # shellcheck disable=SC2016
 documented=$(sed -n 's/^| `\([a-z0-9.+-]*\)` |.*/\1/p' docs/dependencies.md | LC_ALL=C sort -u)

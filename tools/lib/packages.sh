@@ -58,3 +58,17 @@ posed_test_packages=(
   "iproute2|network namespaces for the message tests"
   "systemd|checks of the service's unit"
 )
+
+# Installed by `tools/test --vm` alone.
+posed_vm_packages=(
+  "qemu-system-x86|emulates the virtual machine"
+  "mmdebstrap|makes its Debian system"
+  "e2fsprogs|makes its disk"
+  "busybox-static|its first program"
+  "cpio|its initial file system"
+  "kmod|sorts its kernel modules"
+  "make|compiles kernel modules"
+  "libelf1|used by the kernel's tools that compile modules"
+  "xz-utils|unpacks the kernel's source"
+  "python3|unpacks the kernel"
+)

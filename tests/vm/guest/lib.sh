@@ -1,0 +1,173 @@
+# shellcheck shell=bash disable=SC2034  # variables that the cases read
+# What the cases share. A case is a function case_NAME with a line before it that says what it shows; it runs in a process of its own with
+# `set -e`, and ends by fail, skip, or a command that fails.
+set -euo pipefail
+set -E
+trap 'echo "line $LINENO: $BASH_COMMAND" >>/run/reason' ERR
+
+fail() {
+  echo "$*" | tee -a /run/reason
+  trap - ERR
+  exit 1
+}
+
+skip() {
+  echo "$*" | tee -a /run/reason
+  trap - ERR
+  exit 77
+}
+
+trap '[ ! -e posed.log ] || { echo "---- posed.log"; cat posed.log; }' EXIT
+
+# wait_until SECONDS COMMAND...: true as soon as the command succeeds; false where it did not in that time.
+wait_until() {
+  local -r end=$((SECONDS + $1))
+  shift
+  until "$@" >/dev/null 2>&1; do
+    [ "$SECONDS" -lt "$end" ] || return 1
+    sleep 0.2
+  done
+}
+
+# ---- posed
+
+# write_config: case.toml with what comes on standard input, and a small load.
+write_config() {
+  {
+    cat
+    cat <<'END'
+
+[detector]
+enabled = false
+
+[dynamic]
+mode = "off"
+
+[tracker]
+features = 300
+
+[mapper]
+bundle_keyframes = 0
+loop_closing = false
+END
+  } >case.toml
+}
+
+# write_synthetic_config: the same with the rendered camera, 5 frames a second.
+write_synthetic_config() {
+  {
+    cat
+    cat <<'END'
+
+[source]
+kind = "synthetic"
+
+[source.synthetic]
+people = 0
+rate_hz = 5.0
+END
+  } | write_config
+}
+
+start_posed() {
+  posed --config case.toml >>posed.log 2>&1 &
+  posed=$!
+}
+
+# expect_log SECONDS PATTERN [TIMES]: posed says so within that time, so many times in all.
+expect_log() {
+  # shellcheck disable=SC2016  # expanded by the inner shell
+  wait_until "$1" bash -c '[ "$(grep -cE -- "$1" posed.log)" -ge "$2" ]' count "$2" "${3:-1}" || fail "posed does not log '$2'"
+}
+
+# end_posed: asks it to end; it must do so, and say that all is well.
+end_posed() {
+  kill -TERM "$posed"
+  wait_until 20 bash -c "! kill -0 $posed" || fail "posed does not end"
+  local status=0
+  wait "$posed" || status=$?
+  [ "$status" -eq 0 ] || fail "posed ended with status $status"
+}
+
+# count_rows FILE: of a table with a heading; 0 where there is none.
+count_rows() { tail -n +2 "$1" 2>/dev/null | wc -l; }
+
+# expect_poses NUMBER: so many more messages with a pose, or without one while there is none, come from posed.
+expect_poses() {
+  rm -f poses.csv
+  timeout 60 posectl watch --count "$1" --timeout 20 --csv poses.csv || true # its status tells of gaps, which a slow machine has
+  [ "$(count_rows poses.csv)" -ge "$1" ] || fail "posed does not publish $1 poses"
+}
+
+# ---- Cameras
+
+# load_vivid OPTIONS...: simulated cameras as /dev/video0 and so on, with the first input, a webcam.
+load_vivid() {
+  modprobe vivid no_error_inj=0 "$@"
+  udevadm settle
+}
+
+set_format() { # DEVICE FOURCC WIDTH HEIGHT
+  v4l2-ctl -d "$1" --set-fmt-video="width=$3,height=$4,pixelformat=$2"
+}
+
+# ---- Lines
+
+readonly gpio_folder=/sys/kernel/config/gpio-sim/robot
+
+# plug_gpio: a simulated chip with eight lines, labelled `robot`; sets `gpio_chip`, and `gpio_lines` to the folder with a folder
+# sim_gpioN a line.
+plug_gpio() {
+  modprobe gpio-sim
+  mountpoint -q /sys/kernel/config || mount -t configfs none /sys/kernel/config
+  if [ ! -d "$gpio_folder" ]; then
+    mkdir -p "$gpio_folder/bank0"
+    echo 8 >"$gpio_folder/bank0/num_lines"
+    echo robot >"$gpio_folder/bank0/label"
+  fi
+  echo 1 >"$gpio_folder/live"
+  udevadm settle
+  gpio_chip=$(cat "$gpio_folder/bank0/chip_name")
+  gpio_lines=/sys/devices/platform/$(cat "$gpio_folder/dev_name")/$gpio_chip
+}
+
+# pull LINE up|down: what drives an input.
+pull() { echo "pull-$2" >"$gpio_lines/sim_gpio$1/pull"; }
+
+# levels_of LINE SECONDS: the levels that it takes in this time, one digit each change.
+levels_of() {
+  local -r end=$((SECONDS + $2))
+  local level last=''
+  while [ "$SECONDS" -lt "$end" ]; do
+    level=$(cat "$gpio_lines/sim_gpio$1/value")
+    [ "$level" = "$last" ] || printf %s "$level"
+    last=$level
+    sleep 0.05
+  done
+}
+
+unplug_gpio() { echo 0 >"$gpio_folder/live"; }
+
+# clean_up: after each case, whatever became of it.
+clean_up() {
+  trap - ERR EXIT
+  set +e
+  systemctl kill --signal=KILL posed.service 2>/dev/null
+  systemctl reset-failed posed.service 2>/dev/null
+  local program
+  for program in posed posectl v4l2-ctl cam gpioset gpiomon; do
+    pkill -KILL -x "$program"
+  done
+  sleep 0.2
+  if [ -d "$gpio_folder" ]; then
+    unplug_gpio
+    rmdir "$gpio_folder"/bank0/line* "$gpio_folder/bank0" "$gpio_folder" 2>/dev/null
+  fi
+  local module
+  for module in gpio-sim vivid vimc v4l2loopback; do
+    [ ! -d "/sys/module/${module//-/_}" ] || modprobe -r "$module"
+  done
+  rm -rf /run/case
+}
+mkdir -p /run/case
+cd /run/case
