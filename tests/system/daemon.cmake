@@ -8,3 +8,7 @@ posed_test(lcm_delivery_test
   LABELS system)
 target_compile_definitions(lcm_delivery_test PRIVATE POSED_SUBSCRIBER="$<TARGET_FILE:pose_subscriber>")
 add_dependencies(lcm_delivery_test pose_subscriber)
+
+posed_test(kill_test SOURCES kill_test.cpp LIBRARIES posed_slam posed_config posed_core LABELS system)
+target_compile_definitions(kill_test PRIVATE POSED_DAEMON="$<TARGET_FILE:posed>")
+add_dependencies(kill_test posed)
