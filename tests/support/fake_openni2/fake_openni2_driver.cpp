@@ -106,7 +106,7 @@ class Stream final : public oni::driver::StreamBase {
 
   OniBool isPropertySupported(int id) override {
     const bool automatic = id == ONI_STREAM_PROPERTY_AUTO_EXPOSURE || id == ONI_STREAM_PROPERTY_AUTO_WHITE_BALANCE;
-    return id == ONI_STREAM_PROPERTY_VIDEO_MODE || id == ONI_STREAM_PROPERTY_MIRRORING ||
+    return id == ONI_STREAM_PROPERTY_VIDEO_MODE || id == ONI_STREAM_PROPERTY_MIRRORING || id == ONI_STREAM_PROPERTY_CROPPING ||
            (automatic && sensor_ == ONI_SENSOR_COLOR);
   }
 
@@ -116,6 +116,7 @@ class Stream final : public oni::driver::StreamBase {
     switch (id) {
       case ONI_STREAM_PROPERTY_VIDEO_MODE: return put(owner_.mode(sensor_), data, size);
       case ONI_STREAM_PROPERTY_MIRRORING: return put<OniBool>(owner_.mirrored(sensor_) ? TRUE : FALSE, data, size);
+      case ONI_STREAM_PROPERTY_CROPPING: return put(OniCropping{}, data, size);
       case ONI_STREAM_PROPERTY_HORIZONTAL_FOV:
       case ONI_STREAM_PROPERTY_VERTICAL_FOV: return put(kFieldOfView, data, size);
       case ONI_STREAM_PROPERTY_MAX_VALUE: return put(10'000, data, size);
@@ -133,6 +134,7 @@ class Stream final : public oni::driver::StreamBase {
         }
         owner_.mirrored(sensor_) = get<OniBool>(data) != FALSE;
         return ONI_STATUS_OK;
+      case ONI_STREAM_PROPERTY_CROPPING: return ONI_STATUS_OK;
       case ONI_STREAM_PROPERTY_AUTO_EXPOSURE: owner_.state.auto_exposure = get<OniBool>(data) != FALSE; return ONI_STATUS_OK;
       case ONI_STREAM_PROPERTY_AUTO_WHITE_BALANCE:
         owner_.state.auto_white_balance = get<OniBool>(data) != FALSE;
@@ -147,6 +149,8 @@ class Stream final : public oni::driver::StreamBase {
     raisePropertyChanged(ONI_STREAM_PROPERTY_VIDEO_MODE, &mode, sizeof mode);
     const OniBool mirrored = owner_.mirrored(sensor_) ? TRUE : FALSE;
     raisePropertyChanged(ONI_STREAM_PROPERTY_MIRRORING, &mirrored, sizeof mirrored);
+    const OniCropping cropping{};  // without which the player delivers nothing
+    raisePropertyChanged(ONI_STREAM_PROPERTY_CROPPING, &cropping, sizeof cropping);
   }
 
   OniStatus start() override {
