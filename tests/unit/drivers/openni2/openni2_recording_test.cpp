@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <thread>
@@ -18,7 +19,11 @@ using testing::HasSubstr;
 const Clock& kClock = SystemClock::instance();
 constexpr int kFrames = 40;
 constexpr std::uint64_t kPeriod_us = 20'000;
-constexpr std::uint64_t kFirst_us = 5'000'000;
+constexpr std::uint64_t kFirst_us = 10'000'000;
+constexpr std::uint64_t kLeadIn_us = 2'100'000;
+constexpr std::uint64_t kMostLeadIn = 2000;  // ms
+constexpr std::uintmax_t kColorImage_bytes = 3 * kWidth * kHeight;
+constexpr std::uintmax_t kUnfinished_bytes = kFrames / 2 * kColorImage_bytes;
 
 /// Which image it is, by one pixel's colour: those of fewer than 256 images differ.
 int index_of(const RgbdFrame& frame) {
@@ -34,8 +39,9 @@ class OpenNi2RecordingTest : public OpenNi2Test {
  protected:
   OpenNi2RecordingTest() { fake_openni2().plug(fake_camera()); }
 
-  /// Records kFrames images of each stream, one colour image of which, number 11, is missing; says how many bytes it wrote.
-  std::uintmax_t record(const std::string& path, bool mirrored = false) {
+  /// Records some images number 0, then those from 1 to kFrames, of which one colour image is missing; says how many bytes it
+  /// wrote.
+  void record(const std::string& path, bool mirrored = false, const std::string& unfinished = {}) {
     openni::OpenNI::initialize();
     {
       openni::Device device;
@@ -53,13 +59,24 @@ class OpenNi2RecordingTest : public OpenNi2Test {
       recorder.attach(color);
       recorder.attach(depth);
       recorder.start();
-      std::this_thread::sleep_for(200ms);  // the recorder's thread has no way to say that it is ready
+      // The recorder's thread cannot say when it is ready: images number 0 until some are in the file.
+      for (std::uint64_t i = 0; std::filesystem::file_size(path) < 4 * kColorImage_bytes && i < kMostLeadIn; ++i) {
+        push_pair(kFirst_us - kLeadIn_us + 1000 * i, 0);
+        std::this_thread::sleep_for(1ms);
+      }
       for (int i = 1; i <= kFrames; ++i) {
         const std::uint64_t stamp_us = kFirst_us + static_cast<std::uint64_t>(i) * kPeriod_us;
         if (i != kMissing) {
           push_color(stamp_us, i);
         }
         push_depth(stamp_us + 1000, i);
+      }
+      if (!unfinished.empty()) {
+        while (std::filesystem::file_size(path) < kUnfinished_bytes) {
+          std::this_thread::sleep_for(1ms);
+        }
+        std::filesystem::copy_file(path, unfinished);
+        std::filesystem::resize_file(unfinished, kUnfinished_bytes);
       }
       recorder.stop();
       recorder.destroy();
@@ -70,7 +87,6 @@ class OpenNi2RecordingTest : public OpenNi2Test {
       device.close();
     }
     openni::OpenNI::shutdown();
-    return std::filesystem::file_size(path);
   }
 
   SourceConfig playing(const std::string& path, Pacing pacing) const {
@@ -112,12 +128,13 @@ TEST_F(OpenNi2RecordingTest, LockstepDeliversEachFrameAndRepeatsExactly) {
   const std::string path = folder_ / "walk.oni";
   record(path);
   const std::vector<Seen> first = play(playing(path, Pacing::Lockstep));
-  ASSERT_EQ(first.size(), static_cast<std::size_t>(kFrames - 1));
+  const auto begin = std::find_if(first.begin(), first.end(), [](const Seen& seen) { return seen.index == 1; });
+  ASSERT_EQ(std::distance(begin, first.end()), kFrames - 1);
   int index = 1;
-  for (const Seen& seen : first) {
+  for (auto seen = begin; seen != first.end(); ++seen) {
     index += index == kMissing ? 1 : 0;
-    EXPECT_EQ(seen.index, index);
-    EXPECT_EQ(seen.stamp_utc_ns - first.front().stamp_utc_ns, (index - 1) * static_cast<std::int64_t>(kPeriod_us) * 1000);
+    EXPECT_EQ(seen->index, index);
+    EXPECT_EQ(seen->stamp_utc_ns - begin->stamp_utc_ns, (index - 1) * static_cast<std::int64_t>(kPeriod_us) * 1000);
     ++index;
   }
   for (int again = 0; again < 5; ++again) {
@@ -129,20 +146,22 @@ TEST_F(OpenNi2RecordingTest, RealtimeKeepsToTheStampsAndEnds) {
   const std::string path = folder_ / "walk.oni";
   record(path);
   Running running(playing(path, Pacing::Realtime), kClock);
-  const Capture first = running.next();
-  ASSERT_EQ(first.kind, CaptureKind::Frame);
-  const TimeNs first_ns = first.frame->capture_ns;
-  int frames = 1;
+  TimeNs first_ns = 0;
+  int frames = 0;
   Capture capture = running.next();
   for (; capture.kind == CaptureKind::Frame; capture = running.next()) {
-    ++frames;
-    const int index = index_of(*capture.frame);
-    EXPECT_EQ(capture.frame->capture_ns - first_ns, (index - 1) * static_cast<TimeNs>(kPeriod_us) * 1000);
     EXPECT_GE(kClock.now_ns(), capture.frame->capture_ns) << "never before it is due";
+    const int index = index_of(*capture.frame);
+    if (index == 0) {
+      continue;
+    }
+    first_ns = index == 1 ? capture.frame->capture_ns : first_ns;
+    EXPECT_EQ(capture.frame->capture_ns - first_ns, (index - 1) * static_cast<TimeNs>(kPeriod_us) * 1000);
+    ++frames;
   }
   EXPECT_EQ(capture.kind, CaptureKind::EndOfStream) << capture.error.message;
   EXPECT_EQ(frames, kFrames - 1);
-  EXPECT_EQ(running.health().unpaired, 1U);
+  EXPECT_GE(running.health().unpaired, 1U);
   EXPECT_EQ(running.health().stalls, 0U);
 }
 
@@ -176,15 +195,16 @@ TEST_F(OpenNi2RecordingTest, TurnsWhatWasRecordedMirrored) {
   Running running(playing(path, Pacing::Lockstep), kClock);
   const Capture capture = running.next();
   ASSERT_EQ(capture.kind, CaptureKind::Frame) << capture.error.message;
-  EXPECT_EQ((&capture.frame->bgr.at(0, 5))[2], test_color(kWidth - 1, 5, 0, 1));
+  EXPECT_EQ((&capture.frame->bgr.at(0, 5))[2], test_color(kWidth - 1, 5, 0, 0));
   EXPECT_EQ(capture.frame->depth_m.at(kWidth - 1, 5), 0.0F);
   EXPECT_GT(capture.frame->depth_m.at(0, 5), 0.0F);
 }
 
 TEST_F(OpenNi2RecordingTest, SaysWhereItBreaksOff) {
+  const std::string whole = folder_ / "whole.oni";
   const std::string path = folder_ / "broken.oni";
-  const std::uintmax_t bytes = record(path);
-  std::filesystem::resize_file(path, bytes / 2);
+  record(whole, false, path);
+  const auto frames_of_whole = static_cast<int>(play(playing(whole, Pacing::Lockstep)).size());
   for (const Pacing pacing : {Pacing::Lockstep, Pacing::Realtime}) {
     SourceConfig config = playing(path, pacing);
     config.live.stall_timeout_s = 0.3;
@@ -194,8 +214,8 @@ TEST_F(OpenNi2RecordingTest, SaysWhereItBreaksOff) {
     for (; capture.kind == CaptureKind::Frame; capture = running.next()) {
       ++frames;
     }
-    EXPECT_GT(frames, kFrames / 4);
-    EXPECT_LT(frames, kFrames);
+    EXPECT_GT(frames, kFrames / 8);
+    EXPECT_LT(frames, frames_of_whole);
     EXPECT_EQ(capture.kind, CaptureKind::SkippedFrame);
     EXPECT_THAT(capture.error.message, HasSubstr("breaks off"));
     EXPECT_EQ(running.next().kind, CaptureKind::EndOfStream);
@@ -211,22 +231,18 @@ TEST_F(OpenNi2RecordingTest, SaysWhatIsWrongWithAFile) {
   EXPECT_THAT(made(std::string(300, 'x') + ".oni").error().message, HasSubstr("304 characters, and OpenNI2 keeps 255"));
 
   const std::string text = folder_.write("text.oni", "this is no recording").string();
-  Running running(playing(text, Pacing::Lockstep), kClock);
-  const Capture refused = running.next();
-  EXPECT_EQ(refused.error.code, ErrorCode::BadData);
-  EXPECT_THAT(refused.error.message, HasSubstr("cannot be read as an OpenNI recording"));
+  EXPECT_EQ(made(text).error().code, ErrorCode::BadData);
+  EXPECT_THAT(made(text).error().message, HasSubstr("cannot be read as an OpenNI recording"));
 
   const std::string path = folder_ / "walk.oni";
   record(path);
   CameraIntrinsics larger = small_camera();
   larger.width = 640;
   larger.height = 480;
-  auto source = *make_openni2_source(playing(path, Pacing::Lockstep), larger, kClock);
-  FramePool pool(larger.width, larger.height, 2);
-  ASSERT_TRUE(source->start(pool));
-  const Capture wrong_size = source->next({});
-  EXPECT_EQ(wrong_size.error.code, ErrorCode::Unsupported);
-  EXPECT_THAT(wrong_size.error.message, HasSubstr("holds colour as 64x48 rgb888 at 30 Hz; the calibration's size is 640x480"));
+  const auto wrong_size = make_openni2_source(playing(path, Pacing::Lockstep), larger, kClock);
+  ASSERT_FALSE(wrong_size);
+  EXPECT_EQ(wrong_size.error().code, ErrorCode::Unsupported);
+  EXPECT_THAT(wrong_size.error().message, HasSubstr("holds colour as 64x48 rgb888 at 30 Hz; the calibration's size is 640x480"));
 }
 
 }  // namespace

@@ -118,8 +118,8 @@ TEST_F(OpenNi2StampsTest, MapsTheDevicesClockOntoOurs) {
   const TimeNs worst_ns = errors_ns.back();
   RecordProperty("median_error_us", std::to_string(median_ns / 1000));
   RecordProperty("worst_error_us", std::to_string(worst_ns / 1000));
-  EXPECT_LT(median_ns, 100'000);
-  EXPECT_LT(worst_ns, 500'000);
+  EXPECT_LT(median_ns, 20'000);
+  EXPECT_LT(worst_ns, 100'000);
   EXPECT_GT(running.health().clock_error_ns, 0);
   EXPECT_LT(running.health().clock_error_ns, 500'000);
   EXPECT_EQ(running.health().clock_resets, 0U);
