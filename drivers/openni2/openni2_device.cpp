@@ -1,6 +1,8 @@
 #include "drivers/openni2/openni2_device.h"
 
+#include <chrono>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -15,6 +17,8 @@ namespace posed {
 namespace {
 
 constexpr float kStepped = -1.0F;  // playback speed: one image for each wait
+constexpr int kPlayerBegins_ms = 2000;
+constexpr std::chrono::milliseconds kPlayerRests{20};
 
 std::string_view name_of(OpenNi2Device::Kind kind) {
   return kind == OpenNi2Device::Color ? "colour" : "depth";
@@ -57,27 +61,8 @@ Status OpenNi2Device::open_all(bool frame_sync) {
     return tl::unexpected(std::move(watch.error()));
   }
   watch_ = *std::move(watch);
-  for (const Kind kind : {Color, Depth}) {
-    if (Status prepared = prepare(kind); !prepared) {
-      return prepared;
-    }
-  }
-  if (device_.isFile()) {
-    device_.getPlaybackControl()->setRepeatEnabled(false);
-    device_.getPlaybackControl()->setSpeed(kStepped);
-  } else {
-    if (Status registered = register_depth(); !registered) {
-      return registered;
-    }
-    set_automatics();
-  }
-  if (Status started = start(); !started) {
+  if (Status started = device_.isFile() ? start_recording() : start_camera(frame_sync); !started) {
     return started;
-  }
-  // Only now: OpenNI2 puts into the group of synchronous streams those that run.
-  synced_ = frame_sync && !device_.isFile();
-  if (synced_ && device_.setDepthColorSyncEnabled(true) != openni::STATUS_OK) {
-    log_info("OpenNI2 camera '{}' has no frame synchronisation", watch_->uri());
   }
   // A thread's first wait makes things that later ones use.
   openni::VideoStream* none = nullptr;
@@ -88,19 +73,64 @@ Status OpenNi2Device::open_all(bool frame_sync) {
   return {};
 }
 
-Status OpenNi2Device::prepare(Kind kind) {
-  Stream& stream = streams_[kind];
+Status OpenNi2Device::start_camera(bool frame_sync) {
+  for (const Kind kind : {Color, Depth}) {
+    if (Status created = create(kind); !created) {
+      return created;
+    }
+    if (Status chosen = choose_mode(kind); !chosen) {
+      return chosen;
+    }
+    unmirror(streams_[kind]);
+  }
+  if (Status registered = register_depth(); !registered) {
+    return registered;
+  }
+  set_automatics();
+  for (const Kind kind : {Color, Depth}) {
+    if (Status started = start(kind); !started) {
+      return started;
+    }
+  }
+  // Only now: OpenNI2 puts into the group of synchronous streams those that run.
+  synced_ = frame_sync;
+  if (synced_ && device_.setDepthColorSyncEnabled(true) != openni::STATUS_OK) {
+    log_info("OpenNI2 camera '{}' has no frame synchronisation", watch_->uri());
+  }
+  return {};
+}
+
+Status OpenNi2Device::start_recording() {
+  device_.getPlaybackControl()->setRepeatEnabled(false);
+  device_.getPlaybackControl()->setSpeed(kStepped);
+  Status fits;
+  for (const Kind kind : {Color, Depth}) {
+    Status started = create(kind);
+    if (started) {
+      streams_[kind].gate.close();
+      streams_[kind].stream.setFrameBuffersAllocator(&streams_[kind].gate);
+      started = start(kind).and_then([&] { return take_recorded_mode(kind); });
+    }
+    fits = fits ? started : fits;
+  }
+  // Whatever is wrong, the player is let begin: OpenNI2 waits three seconds for one that it closes before, and then kills its
+  // thread.
+  openni::VideoStream* streams[] = {&streams_[Color].stream, &streams_[Depth].stream};
+  int ready = 0;
+  if (openni::OpenNI::waitForAnyStream(streams, kKinds, &ready, kPlayerBegins_ms) != openni::STATUS_OK) {
+    return make_error(ErrorCode::BadData, fmt::format("recording '{}' holds no image", watch_->uri()));
+  }
+  return fits;
+}
+
+Status OpenNi2Device::create(Kind kind) {
   if (!device_.hasSensor(sensor_of(kind))) {
     return make_error(ErrorCode::Unsupported, fmt::format("OpenNI2 device '{}' has no {} stream", watch_->uri(), name_of(kind)));
   }
-  if (stream.stream.create(device_, sensor_of(kind)) != openni::STATUS_OK) {
+  if (streams_[kind].stream.create(device_, sensor_of(kind)) != openni::STATUS_OK) {
     return make_error(ErrorCode::Io,
                       fmt::format("OpenNI2 device '{}': no {} stream: {}", watch_->uri(), name_of(kind), openni2_error()));
   }
-  if (Status chosen = device_.isFile() ? take_recorded_mode(kind) : choose_mode(kind); !chosen) {
-    return chosen;
-  }
-  unmirror(stream);
   return {};
 }
 
@@ -140,8 +170,7 @@ Status OpenNi2Device::take_recorded_mode(Kind kind) {
                       fmt::format("recording '{}' holds {} as {}; the calibration's size is {}x{}", watch_->uri(), name_of(kind),
                                   openni2_mode_name(stream.mode), wish_.width, wish_.height));
   }
-  stream.gate.close();
-  stream.stream.setFrameBuffersAllocator(&stream.gate);
+  unmirror(stream);
   return {};
 }
 
@@ -186,14 +215,12 @@ void OpenNi2Device::set_automatics() {
   }
 }
 
-Status OpenNi2Device::start() {
-  for (const Kind kind : {Color, Depth}) {
-    if (streams_[kind].stream.start() != openni::STATUS_OK) {
-      return make_error(ErrorCode::Io,
-                        fmt::format("OpenNI2 device '{}': {} does not start: {}", watch_->uri(), name_of(kind), openni2_error()));
-    }
-    streams_[kind].started = true;
+Status OpenNi2Device::start(Kind kind) {
+  if (streams_[kind].stream.start() != openni::STATUS_OK) {
+    return make_error(ErrorCode::Io,
+                      fmt::format("OpenNI2 device '{}': {} does not start: {}", watch_->uri(), name_of(kind), openni2_error()));
   }
+  streams_[kind].started = true;
   return {};
 }
 
@@ -211,6 +238,10 @@ void OpenNi2Device::stop() noexcept {
 
 void OpenNi2Device::close() noexcept {
   stop();
+  if (device_.isValid() && device_.isFile()) {
+    // The player looks through its streams without a lock, but for when it sleeps (10 ms) because none runs.
+    std::this_thread::sleep_for(kPlayerRests);
+  }
   for (Stream& stream : streams_) {
     stream.stream.destroy();
   }

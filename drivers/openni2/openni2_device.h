@@ -45,13 +45,15 @@ class OpenNi2Device {
 
  private:
   Status open_all(bool frame_sync);
-  Status prepare(Kind kind);
+  Status start_camera(bool frame_sync);
+  Status start_recording();
+  Status create(Kind kind);
   Status choose_mode(Kind kind);
   Status take_recorded_mode(Kind kind);
   void unmirror(Stream& stream);
   Status register_depth();
   void set_automatics();
-  Status start();
+  Status start(Kind kind);
 
   const OpenNi2Config config_;
   const OpenNi2Wish wish_;

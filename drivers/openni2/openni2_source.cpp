@@ -1,10 +1,6 @@
 #include "drivers/openni2/openni2_source.h"
 
 #include <algorithm>
-#include <exception>
-#include <filesystem>
-#include <limits>
-#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -67,9 +63,10 @@ Result<std::unique_ptr<RgbdSource>> make_openni2_source(const SourceConfig& conf
                                                               device, device.size(), ONI_MAX_STR - 1));
   }
   if (is_openni2_recording(device)) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(device, error)) {
-      return make_error(ErrorCode::NotFound, fmt::format("source.openni2.device: there is no recording '{}'", device));
+    // Unlike a camera, it does not get better by waiting.
+    OpenNi2Device recording(config.openni2, {camera.width, camera.height, config.live.rate_hz});
+    if (Status readable = recording.open(false); !readable) {
+      return tl::unexpected(std::move(readable.error()));
     }
     options.live.stall_timeout_s = kNoStall_s;  // the camera itself tells when a recording breaks off
   }
