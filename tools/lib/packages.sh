@@ -24,6 +24,7 @@ posed_build_packages=(
   "libonnx-dev|ONNX message classes"
   "libprotobuf-dev|Protocol Buffers, which ONNX files are"
   "libopencv-dnn-dev|second engine for networks"
+  "libcamera-dev|colour cameras by libcamera"
   "libgpiod-dev|GPIO lines: status light, enable input, trigger"
 )
 
