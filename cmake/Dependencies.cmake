@@ -23,15 +23,6 @@ set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION "${LCM_LIBRARY}" INT
 pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET libsystemd)
 find_program(LCM_GEN lcm-gen REQUIRED)
 
-# GPIO lines. Version 2 of libgpiod has another interface.
-if(POSED_GPIO)
-  pkg_check_modules(GPIOD IMPORTED_TARGET libgpiod>=1.6 libgpiod<2)
-  if(NOT GPIOD_FOUND)
-    message(WARNING "libgpiod 1.6 (libgpiod-dev) is not here: building without GPIO lines")
-    set(POSED_GPIO OFF)
-  endif()
-endif()
-
 # The detector. oneDNN's own CMake configuration asks for OpenCL's development files, which nothing here needs; the ONNX library has
 # the classes of the format's messages, all that is used of it.
 find_path(DNNL_INCLUDE_DIR oneapi/dnnl/dnnl.hpp REQUIRED)

@@ -25,6 +25,7 @@ posed_build_packages=(
   "libprotobuf-dev|Protocol Buffers, which ONNX files are"
   "libopencv-dnn-dev|second engine for networks"
   "libopenni2-dev|cameras by OpenNI2"
+  "libcamera-dev|colour cameras by libcamera"
   "libgpiod-dev|GPIO lines: status light, enable input, trigger"
 )
 

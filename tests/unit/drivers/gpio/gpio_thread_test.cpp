@@ -70,6 +70,20 @@ TEST_F(GpioThreadTest, WorksAllLinesAndLeavesThemInactive) {
   EXPECT_EQ(errors_, 0);
 }
 
+TEST_F(GpioThreadTest, AnEdgeOfTheInputWakesTheThread) {
+  config_.status_line = config_.trigger_line = -1;  // which wake it, too
+  const auto lines = start();
+  const TimeNs begin_ns = clock_.now_ns();
+  constexpr int kChanges = 20;
+  for (int i = 0; i < kChanges; ++i) {
+    const bool level = i % 2 == 0;
+    chip_.set_input(2, level);
+    ASSERT_TRUE(comes_true([&] { return lines->enabled() == level; }));
+  }
+  // A thread that only looks at the line every second would take twice as long; one that is woken takes 0.4 s.
+  EXPECT_LT(clock_.now_ns() - begin_ns, kChanges * kNsPerSecond / 2);
+}
+
 TEST_F(GpioThreadTest, EndsAtOnceAndLeaksNothing) {
   start().reset();  // whatever the libraries open once
   const std::ptrdiff_t descriptors = entries("/proc/self/fd");

@@ -26,13 +26,21 @@ class GpioWorkerTest : public ::testing::Test {
     return *worker_;
   }
 
-  /// As the thread would: steps whenever one is due.
+  /// As the thread would that was just woken: steps at once and whenever it is due.
   void run_for(TimeNs duration_ns) {
+    next_ns_ = worker().step();
+    sleep_for(duration_ns);
+  }
+
+  /// The same of a thread that nothing has woken.
+  void sleep_for(TimeNs duration_ns) {
     const TimeNs end_ns = clock_.now_ns() + duration_ns;
-    for (TimeNs next_ns = worker().step(); clock_.now_ns() < end_ns; next_ns = worker().step()) {
-      ASSERT_GT(next_ns, clock_.now_ns());
-      clock_.advance(std::min(next_ns, end_ns) - clock_.now_ns());
+    while (next_ns_ <= end_ns) {
+      ASSERT_GT(next_ns_, clock_.now_ns());
+      clock_.advance(next_ns_ - clock_.now_ns());
+      next_ns_ = worker().step();
     }
+    clock_.advance(end_ns - clock_.now_ns());
   }
 
   /// Milliseconds after the start.
@@ -45,6 +53,7 @@ class GpioWorkerTest : public ::testing::Test {
 
  private:
   std::optional<GpioWorker> worker_;
+  TimeNs next_ns_ = kNever_ns;
 };
 
 using Edges = std::vector<FakeChip::Edge>;
@@ -176,7 +185,7 @@ TEST_F(GpioWorkerTest, AnEnableInputWhoseEventIsLostIsReadAgain) {
   chip_.set_input(kEnable, true);
   run_for(100 * kNsPerMs);
   chip_.set_input_silently(kEnable, false);
-  run_for(HeldLine::kRecheck_ns + EnableInput::kSettle_ns);
+  sleep_for(HeldLine::kRecheck_ns + EnableInput::kSettle_ns);
   EXPECT_FALSE(worker().enabled());
 }
 
@@ -187,7 +196,7 @@ TEST_F(GpioWorkerTest, AnEnableInputThatCannotTellIsPolled) {
   run_for(100 * kNsPerMs);
   EXPECT_EQ(worker().event_fd(), -1);
   chip_.set_input(kEnable, false);
-  run_for(EnableInput::kPoll_ns + EnableInput::kSettle_ns);
+  sleep_for(EnableInput::kPoll_ns + EnableInput::kSettle_ns);
   EXPECT_FALSE(worker().enabled());
 }
 
