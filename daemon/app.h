@@ -13,6 +13,7 @@
 #include "core/se3.h"
 #include "daemon/health.h"
 #include "daemon/tracked_view.h"
+#include "drivers/gpio_lines.h"
 #include "drivers/rgbd_source.h"
 
 namespace posed {
@@ -38,14 +39,15 @@ struct AppOptions {
   std::function<void(const TrackedView&)> on_tracked;
   /// Called when the source skips a bad frame or fails, on the capture thread, with the reason.
   std::function<void(const Error&)> on_source_error;
+  const GpioLines* gpio = nullptr;    ///< whose health is told with the pipeline's own; must outlive the App
   std::optional<MapFiles> map_files;  ///< instead of those of the configuration
 };
 
 /// The pipeline: the one place that owns the threads and wires source, detector, tracker, mapper and publisher together
 /// (docs/threads.md). The daemon and `posectl replay` run this same class. With Pacing::Realtime every stage has its own thread.
 /// With Pacing::Lockstep capture, detection, tracking and mapping take turns on one thread, so that nothing is dropped and the
-/// result is a function of the input alone. Thread-bound to the thread that made it, but for `health` and `request_map_save`, which
-/// are thread-safe.
+/// result is a function of the input alone. Thread-bound to the thread that made it, but for `health`, `set_paused` and
+/// `request_map_save`, which are thread-safe.
 class App {
  public:
   /// Opens the source, allocates everything and loads the map. Nothing runs yet. A map that cannot be used is an error
@@ -65,6 +67,10 @@ class App {
   virtual void stop() = 0;
 
   virtual HealthReport health() const = 0;
+
+  /// Lets frames go instead of handing them on: no poses are made from the next frame on, until it is set back. The map, the
+  /// source and the status go on. Does nothing in lockstep, whose result depends on its input alone. May come before `start`.
+  virtual void set_paused(bool paused) = 0;
 
   /// Has the map saved soon, on the mapping thread; the log and `health` say what came of it. Error: InvalidConfig, where no file
   /// is configured.

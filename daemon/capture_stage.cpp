@@ -22,7 +22,11 @@ bool CaptureStage::next(const std::stop_token& stop, FrameRef& frame) {
     case CaptureKind::Frame:
       captured_.add();
       count_missed(capture.frame->sequence);
-      frame = std::move(capture.frame);
+      if (paused_.load(std::memory_order_relaxed)) {
+        let_go_.add();
+      } else {
+        frame = std::move(capture.frame);
+      }
       return true;
     case CaptureKind::SkippedFrame:
       skipped_.add();
@@ -68,10 +72,12 @@ void CaptureStage::report(HealthReport& health) const {
   health.source_failed = failed_.load(std::memory_order_relaxed);
   health.source_ended = ended_.load(std::memory_order_relaxed);
   health.source = source_.health();
+  health.paused = paused_.load(std::memory_order_relaxed);
   health.frames_captured = captured_.value();
   health.frames_skipped = skipped_.value();
   health.frames_missed = missed_.value();
   health.frames_no_slot = no_slot_.value();
+  health.frames_paused = let_go_.value();
   health.frames_dropped = dropped_.value();
 }
 

@@ -13,8 +13,9 @@
 
 namespace posed {
 
-/// Takes frames from the source and counts what becomes of them. Thread-bound to the capture thread, but for `report`, which is
-/// thread-safe. After the source's start it neither allocates nor locks, but for what `on_error` does, which only errors cause.
+/// Takes frames from the source and counts what becomes of them. Thread-bound to the capture thread, but for `report` and
+/// `set_paused`, which are thread-safe. After the source's start it neither allocates nor locks, but for what `on_error` does,
+/// which only errors cause.
 class CaptureStage {
  public:
   /// `source` and `pool` must outlive the stage. `on_error` may be empty.
@@ -23,7 +24,11 @@ class CaptureStage {
   /// Starts the source; false where it failed.
   bool begin();
 
-  /// The source's next frame, into `frame`, which is empty where this one was lost; false at the end, on failure and on `stop`.
+  /// While paused, frames are taken from the source, counted, and let go, so that the device runs on.
+  void set_paused(bool paused) noexcept { paused_.store(paused, std::memory_order_relaxed); }
+
+  /// The source's next frame, into `frame`, which is empty where this one was lost or let go; false at the end, on failure and on
+  /// `stop`.
   bool next(const std::stop_token& stop, FrameRef& frame);
 
   /// The thread's body in real time: every frame goes into `out`, whose oldest makes way, and is the newest in `newest`; both are
@@ -45,8 +50,10 @@ class CaptureStage {
   Counter no_slot_;
   Counter dropped_;
   Counter missed_;
+  Counter let_go_;
   std::uint64_t next_sequence_ = 0;
   std::uint64_t explained_gap_ = 0;  // frames since the last delivered one that were skipped or had no slot
+  std::atomic<bool> paused_{false};
   std::atomic<bool> failed_{false};
   std::atomic<bool> ended_{false};
 };

@@ -6,6 +6,7 @@
 
 #include "core/estimates.h"
 #include "core/metrics.h"
+#include "drivers/gpio_lines.h"
 #include "drivers/rgbd_source.h"
 
 namespace posed {
@@ -16,11 +17,14 @@ struct HealthReport {
   bool source_failed = false;
   bool source_ended = false;
   SourceHealth source;
+  bool paused = false;  ///< frames are taken and let go, and no poses are made
+  GpioHealth gpio;
 
   std::uint64_t frames_captured = 0;  ///< frames that reached the pool
   std::uint64_t frames_skipped = 0;   ///< bad frames of the source, left out
   std::uint64_t frames_missed = 0;    ///< gaps in the source's count that nothing else explains: lost before it, or it was too slow
   std::uint64_t frames_no_slot = 0;   ///< lost because the frame pool was exhausted
+  std::uint64_t frames_paused = 0;    ///< of those captured: let go because the daemon was paused
   std::uint64_t frames_dropped = 0;   ///< handed back by the full queue before the tracker
   std::uint64_t frames_tracked = 0;   ///< with a pose
   std::uint64_t frames_lost = 0;      ///< processed, without a pose

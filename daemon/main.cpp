@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <sysexits.h>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -13,7 +14,9 @@
 #include "daemon/app.h"
 #include "daemon/exit_code.h"
 #include "daemon/supervisor.h"
+#include "daemon/thread_config.h"
 #include "daemon/version.h"
+#include "drivers/gpio_lines.h"
 
 namespace {
 
@@ -42,13 +45,25 @@ int run_daemon(const Config& config, bool exit_at_end) {
   supervisor_options.exit_at_end = exit_at_end;
   Supervisor supervisor(supervisor_options);
 
+  std::unique_ptr<GpioLines> gpio;
+  if (!config.gpio.chip.empty()) {
+    // It gives the camera its time, so it runs as urgently as the thread that takes the camera's frames.
+    Result<std::unique_ptr<GpioLines>> made = make_gpio_lines(config.gpio, thread_options("gpio", config.pipeline.capture),
+                                                              SystemClock::instance(), supervisor.gpio_error_sink());
+    if (!made) {
+      return fail(made.error());
+    }
+    gpio = std::move(*made);
+  }
+
   AppOptions app_options;
   app_options.on_source_error = supervisor.source_error_sink();
+  app_options.gpio = gpio.get();
   const Result<std::unique_ptr<App>> app = App::create(config, std::move(app_options), SystemClock::instance());
   if (!app) {
     return fail(app.error());
   }
-  const Result<RunEnd> end = supervisor.run(**app);
+  const Result<RunEnd> end = supervisor.run(**app, gpio.get());
   if (!end) {
     return fail(end.error());
   }

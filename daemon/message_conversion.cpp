@@ -145,7 +145,13 @@ status_t to_status_message(const HealthReport& health, const StatusOrigin& origi
   message.source_unpaired = count(health.source.unpaired);
   message.source_clock_resets = count(health.source.clock_resets);
   message.source_clock_error_ns = health.source.clock_error_ns;
+  message.paused = health.paused ? 1 : 0;
+  message.gpio_ok = health.gpio.ok ? 1 : 0;
+  message.trigger_pulses = count(health.gpio.trigger_pulses);
+  message.trigger_missed = count(health.gpio.trigger_missed);
+  message.trigger_worst_lateness_ns = health.gpio.worst_trigger_lateness_ns;
   message.frames_captured = count(health.frames_captured);
+  message.frames_paused = count(health.frames_paused);
   message.frames_skipped = count(health.frames_skipped);
   message.frames_missed = count(health.frames_missed);
   message.frames_no_slot = count(health.frames_no_slot);

@@ -20,6 +20,7 @@
 #include "daemon/mapping_stage.h"
 #include "daemon/publish_stage.h"
 #include "daemon/stage_link.h"
+#include "daemon/thread_config.h"
 #include "daemon/tracking_stage.h"
 
 namespace posed {
@@ -28,11 +29,6 @@ namespace {
 
 std::size_t size_of(int configured) {
   return static_cast<std::size_t>(configured);
-}
-
-ThreadOptions thread_options(std::string name, const ThreadConfig& config) {
-  const SchedulingPolicy policy = config.policy == ThreadPolicyName::Fifo ? SchedulingPolicy::Fifo : SchedulingPolicy::Normal;
-  return {std::move(name), policy, config.priority, config.cpus};
 }
 
 constexpr std::size_t kDetectionsQueue = 8;  // frames; a publisher that is further behind shows only the newest
@@ -79,6 +75,7 @@ class Pipeline final : public App {
         pool_(parts_.source->info().width, parts_.source->info().height,
               size_of(config.pipeline.frame_slots) + parts_.source->info().slots_held),
         links_(config),
+        gpio_(options.gpio),
         capture_(*parts_.source, pool_, std::move(options.on_source_error)),
         tracking_(*parts_.tracker, {links_.snapshots, links_.newest_detections, links_.keyframes, links_.estimates}, clock,
                   is_lockstep() ? FullQueue::Waits : FullQueue::DropsOldest, std::move(options.on_tracked)),
@@ -154,9 +151,14 @@ class Pipeline final : public App {
     mapping_.report(health);
     detection_.report(health);
     publish_.report(health);
+    if (gpio_ != nullptr) {
+      health.gpio = gpio_->health();
+    }
     health.peak_rss_bytes = peak_rss_bytes();
     return health;
   }
+
+  void set_paused(bool paused) override { capture_.set_paused(paused && !is_lockstep()); }
 
   Status request_map_save() override {
     return saver_.can_save().map([this] {
@@ -246,6 +248,7 @@ class Pipeline final : public App {
   FramePool pool_;
   Links links_;  // holds frames of the pool, so it goes before it
 
+  const GpioLines* gpio_;
   CaptureStage capture_;
   TrackingStage tracking_;
   MapSaver saver_;

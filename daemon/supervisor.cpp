@@ -17,8 +17,6 @@ namespace posed {
 
 namespace {
 
-constexpr std::size_t kSourceErrorsKept = 16;  // between two looks
-
 void notify_systemd(const std::string& state) {
   sd_notify(0, state.c_str());
 }  // does nothing without $NOTIFY_SOCKET
@@ -90,7 +88,26 @@ class Supervisor::EventLoop {
   std::function<void()> save_map_;
 };
 
-Supervisor::Supervisor(SupervisorOptions options) : options_(options), source_errors_(kSourceErrorsKept) {}
+std::function<void(const Error&)> Supervisor::ErrorQueue::sink() {
+  return [this](const Error& error) {
+    if (ring.push(error)) {
+      dropped.add();
+    }
+  };
+}
+
+void Supervisor::ErrorQueue::log(const char* origin) {
+  while (const std::optional<Error> error = ring.pop()) {
+    log_warning("{}: {}", origin, error->message);
+  }
+  const std::uint64_t now_dropped = dropped.value();
+  if (now_dropped != dropped_logged) {
+    log_warning("{}: {} more errors, too fast to log them", origin, now_dropped - dropped_logged);
+    dropped_logged = now_dropped;
+  }
+}
+
+Supervisor::Supervisor(SupervisorOptions options) : options_(options) {}
 
 Status Supervisor::block_signals() {
   event_thread = pthread_self();
@@ -112,14 +129,17 @@ Status Supervisor::block_signals() {
 }
 
 std::function<void(const Error&)> Supervisor::source_error_sink() {
-  return [this](const Error& error) {
-    if (source_errors_.push(error)) {
-      source_errors_dropped_.add();
-    }
-  };
+  return source_errors_.sink();
 }
 
-Result<RunEnd> Supervisor::run(App& app) {
+std::function<void(const Error&)> Supervisor::gpio_error_sink() {
+  return gpio_errors_.sink();
+}
+
+Result<RunEnd> Supervisor::run(App& app, GpioLines* gpio) {
+  if (gpio != nullptr) {
+    app.set_paused(!gpio->enabled());
+  }
   if (const Status started = app.start(); !started) {
     return tl::unexpected<Error>(started.error());
   }
@@ -129,7 +149,7 @@ Result<RunEnd> Supervisor::run(App& app) {
   next_health_log_ns_ = last_log_ns_ + options_.health_log_period_ns;
 
   EventLoop loop(
-      options_.poll_period_ns, [&] { return look(app); }, [&] { save_map(app); });
+      options_.poll_period_ns, [&] { return look(app, gpio); }, [&] { save_map(app); });
   const Result<int> ended_by = loop.run();
 
   notify_systemd("STOPPING=1\nSTATUS=stopping");
@@ -137,7 +157,8 @@ Result<RunEnd> Supervisor::run(App& app) {
     log_info("stopping: {}", *ended_by == SIGINT ? "SIGINT" : "SIGTERM");
   }
   app.stop();
-  log_source_errors();
+  source_errors_.log("source");
+  gpio_errors_.log("gpio");
   const HealthReport health = app.health();
   log_health(health);
   if (!ended_by) {
@@ -149,8 +170,12 @@ Result<RunEnd> Supervisor::run(App& app) {
   return health.source_failed ? RunEnd::SourceFailed : RunEnd::SourceEnded;
 }
 
-bool Supervisor::look(App& app) {
-  log_source_errors();
+bool Supervisor::look(App& app, GpioLines* gpio) {
+  source_errors_.log("source");
+  gpio_errors_.log("gpio");
+  if (gpio != nullptr) {
+    work_lines(app, *gpio);
+  }
   const HealthReport health = app.health();
   const TimeNs now_ns = SystemClock::instance().now_ns();
   if (!looked_ || health.state != state_) {
@@ -174,20 +199,23 @@ bool Supervisor::look(App& app) {
   return source_done_ && options_.exit_at_end;
 }
 
-void Supervisor::save_map(App& app) {
-  if (const Status requested = app.request_map_save(); !requested) {
-    log_warning("SIGUSR1: {}", requested.error().message);
+void Supervisor::work_lines(App& app, GpioLines& gpio) {
+  app.set_paused(!gpio.enabled());
+  const HealthReport health = app.health();
+  gpio.show(light_state(health));
+  if (health.paused != paused_) {
+    paused_ = health.paused;
+    log_info("{}", paused_ ? "paused by the enable line" : "running: the enable line is active");
+  }
+  if (health.gpio.ok != lines_held_) {
+    lines_held_ = health.gpio.ok;
+    log_info("gpio: {}", lines_held_ ? "every line is held" : "waiting for a line");
   }
 }
 
-void Supervisor::log_source_errors() {
-  while (const std::optional<Error> error = source_errors_.pop()) {
-    log_warning("source: {}", error->message);
-  }
-  const std::uint64_t dropped = source_errors_dropped_.value();
-  if (dropped != source_errors_dropped_logged_) {
-    log_warning("source: {} more errors, too fast to log them", dropped - source_errors_dropped_logged_);
-    source_errors_dropped_logged_ = dropped;
+void Supervisor::save_map(App& app) {
+  if (const Status requested = app.request_map_save(); !requested) {
+    log_warning("SIGUSR1: {}", requested.error().message);
   }
 }
 
@@ -203,14 +231,30 @@ void Supervisor::log_health(const HealthReport& health) {
   frames_at_last_log_ = frames;
 }
 
+LightState light_state(const HealthReport& health) {
+  if (health.paused) {
+    return LightState::Paused;
+  }
+  if (!health.source.connected || health.source_failed) {
+    return LightState::WaitingForCamera;
+  }
+  switch (health.state) {
+    case TrackingState::Initializing: return LightState::Initializing;
+    case TrackingState::Tracking: return LightState::Tracking;
+    case TrackingState::Lost:
+    case TrackingState::Relocalizing: return LightState::Lost;
+  }
+  return LightState::Lost;
+}
+
 std::string describe(const HealthReport& health, double rate_hz) {
   const std::uint64_t lost_before_tracker =
       health.frames_missed + health.frames_skipped + health.frames_no_slot + health.frames_dropped;
   std::string line = fmt::format(
-      "{}{}, {:.1f} frames/s; frames tracked {}, lost {}, not processed {}; poses published {}, dropped {}, errors {}; track p50 "
+      "{}{}{}, {:.1f} frames/s; frames tracked {}, lost {}, not processed {}; poses published {}, dropped {}, errors {}; track p50 "
       "{:.1f} ms p99 "
       "{:.1f} ms; capture to publish p50 {:.1f} ms p99 {:.1f} ms; map {} keyframes, {} landmarks",
-      to_string(health.state),
+      to_string(health.state), health.paused ? ", paused" : "",
       health.source_failed      ? ", source failed"
       : health.source.connected ? ""
                                 : ", waiting for the camera",
@@ -219,6 +263,16 @@ std::string describe(const HealthReport& health, double rate_hz) {
       health.map_keyframes, health.map_landmarks);
   if (health.source.reconnects + health.source.stalls > 0) {
     line += fmt::format("; camera back {} times, silent {} times", health.source.reconnects, health.source.stalls);
+  }
+  if (health.frames_paused > 0) {
+    line += fmt::format("; frames let go while paused {}", health.frames_paused);
+  }
+  if (!health.gpio.ok) {
+    line += "; a GPIO line is missing";
+  }
+  if (health.gpio.trigger_pulses > 0) {
+    line += fmt::format("; trigger pulses {}, missed {}, at most {:.3f} ms late", health.gpio.trigger_pulses,
+                        health.gpio.trigger_missed, to_ms(health.gpio.worst_trigger_lateness_ns));
   }
   if (!health.detector_model.empty()) {
     line += fmt::format("; people looked for in {} frames by {}, p50 {:.1f} ms p99 {:.1f} ms, {} given up", health.detected,

@@ -24,6 +24,8 @@ posed_build_packages=(
   "libonnx-dev|ONNX message classes"
   "libprotobuf-dev|Protocol Buffers, which ONNX files are"
   "libopencv-dnn-dev|second engine for networks"
+  "libcamera-dev|colour cameras by libcamera"
+  "libgpiod-dev|GPIO lines: status light, enable input, trigger"
 )
 
 posed_demo_packages=(
@@ -39,6 +41,7 @@ posed_test_packages=(
   "libopencv-imgproc-dev|reference image operations in tests"
   "libopencv-features2d-dev|reference ORB in tests and benchmarks"
   "libopencv-imgcodecs-dev|reference image files in tests"
+  "libumockdev-dev|a GPIO chip for tests, below libgpiod"
   "python3|reports and reference computations of tests"
   "python3-numpy|reference computations of tests"
   "python3-torch|tests of the training code"

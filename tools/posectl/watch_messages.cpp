@@ -66,7 +66,13 @@ HealthReport from_status_message(const status_t& message) {
   health.source.unpaired = count_of(message.source_unpaired);
   health.source.clock_resets = count_of(message.source_clock_resets);
   health.source.clock_error_ns = message.source_clock_error_ns;
+  health.paused = message.paused != 0;
+  health.gpio.ok = message.gpio_ok != 0;
+  health.gpio.trigger_pulses = count_of(message.trigger_pulses);
+  health.gpio.trigger_missed = count_of(message.trigger_missed);
+  health.gpio.worst_trigger_lateness_ns = message.trigger_worst_lateness_ns;
   health.frames_captured = count_of(message.frames_captured);
+  health.frames_paused = count_of(message.frames_paused);
   health.frames_skipped = count_of(message.frames_skipped);
   health.frames_missed = count_of(message.frames_missed);
   health.frames_no_slot = count_of(message.frames_no_slot);

@@ -41,6 +41,19 @@ std::string sequence_text(const SequenceMonitor& sequence) {
   return text;
 }
 
+/// Nothing where no lines are used.
+std::string lines_text(const HealthReport& health) {
+  std::string text;
+  if (!health.gpio.ok) {
+    text += "lines      a GPIO line is missing\n";
+  }
+  if (health.gpio.trigger_pulses > 0) {
+    text += fmt::format("trigger    {} pulses  {} missed  at most {:.3f} ms late\n", health.gpio.trigger_pulses,
+                        health.gpio.trigger_missed, to_ms(health.gpio.worst_trigger_lateness_ns));
+  }
+  return text;
+}
+
 std::string health_table(const HealthReport& health) {
   return fmt::format("frames     captured {}  tracked {}  lost {}  dropped {}  missed {}  no slot {}  skipped {}\n",
                      health.frames_captured, health.frames_tracked, health.frames_lost, health.frames_dropped, health.frames_missed,
@@ -53,7 +66,9 @@ std::string health_table(const HealthReport& health) {
                      health.publish_errors) +
          fmt::format("tracker    p50 {:.2f}  p99 {:.2f}  max {:.2f} ms\n", health.track.p50_ms, health.track.p99_ms,
                      health.track.max_ms) +
-         fmt::format("daemon     {:.0f} MB at most{}\n", static_cast<double>(health.peak_rss_bytes) * 1e-6,
+         lines_text(health) +
+         fmt::format("daemon     {:.0f} MB at most{}{}\n", static_cast<double>(health.peak_rss_bytes) * 1e-6,
+                     health.paused ? ", paused" : "",
                      health.source_failed  ? ", the source has failed"
                      : health.source_ended ? ", the source has ended"
                                            : "");

@@ -78,5 +78,31 @@ TEST(CaptureStage, SkippedListLinesThatWereNeverFramesHideNoLaterGap) {
   EXPECT_EQ(health.frames_missed, 1U);
 }
 
+TEST(CaptureStage, LetsFramesGoWhilePausedAndMissesNone) {
+  ListedSource source({{kFrame, 0}, {kFrame, 1}, {CaptureKind::SkippedFrame}, {kFrame, 3}, {kFrame, 5}});
+  FramePool pool(8, 8, 2);
+  CaptureStage stage(source, pool, {});
+  ASSERT_TRUE(stage.begin());
+  std::vector<bool> handed_on;
+  for (const bool paused : {false, true, true, true, false}) {
+    stage.set_paused(paused);
+    FrameRef frame;
+    ASSERT_TRUE(stage.next({}, frame));
+    handed_on.push_back(static_cast<bool>(frame));
+  }
+  EXPECT_EQ(handed_on, (std::vector<bool>{true, false, false, false, true}));
+  EXPECT_EQ(pool.free_slots(), 2U);
+  HealthReport health;
+  stage.report(health);
+  EXPECT_FALSE(health.paused);
+  EXPECT_EQ(health.frames_captured, 4U);
+  EXPECT_EQ(health.frames_paused, 2U);
+  EXPECT_EQ(health.frames_skipped, 1U);
+  EXPECT_EQ(health.frames_missed, 1U);
+  stage.set_paused(true);
+  stage.report(health);
+  EXPECT_TRUE(health.paused);
+}
+
 }  // namespace
 }  // namespace posed

@@ -183,6 +183,12 @@ TEST(StatusMessage, CarriesEveryFieldOfTheReport) {
   health.loops_closed = 18;
   health.maps_joined = 19;
   health.relocalizations = 20;
+  health.frames_paused = 21;
+  health.gpio.trigger_pulses = 22;
+  health.gpio.trigger_missed = 23;
+  health.gpio.worst_trigger_lateness_ns = 24;
+  health.paused = true;
+  health.gpio.ok = false;
   health.track = {100, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
   health.latency.count = 200;
   health.map.count = 300;
@@ -195,11 +201,15 @@ TEST(StatusMessage, CarriesEveryFieldOfTheReport) {
   EXPECT_EQ(m.state, pose_t::STATE_LOST);
   EXPECT_EQ(m.source_failed, 1);
   EXPECT_EQ(m.source_ended, 0);
-  const std::vector<std::int64_t> counters = {m.frames_captured, m.frames_skipped, m.frames_no_slot, m.frames_dropped,
-                                              m.frames_tracked,  m.frames_lost,    m.keyframes,      m.keyframes_delayed,
-                                              m.poses_published, m.poses_dropped,  m.publish_errors, m.map_keyframes,
-                                              m.map_landmarks,   m.peak_rss_bytes, m.frames_missed,  m.map_saves,
-                                              m.map_save_errors, m.loops_closed,   m.maps_joined,    m.relocalizations};
+  EXPECT_EQ(m.paused, 1);
+  EXPECT_EQ(m.gpio_ok, 0);
+  EXPECT_EQ(to_status_message(HealthReport{}, {}).paused, 0);
+  EXPECT_EQ(to_status_message(HealthReport{}, {}).gpio_ok, 1);
+  const std::vector<std::int64_t> counters = {
+      m.frames_captured, m.frames_skipped,    m.frames_no_slot,  m.frames_dropped, m.frames_tracked,  m.frames_lost,
+      m.keyframes,       m.keyframes_delayed, m.poses_published, m.poses_dropped,  m.publish_errors,  m.map_keyframes,
+      m.map_landmarks,   m.peak_rss_bytes,    m.frames_missed,   m.map_saves,      m.map_save_errors, m.loops_closed,
+      m.maps_joined,     m.relocalizations,   m.frames_paused,   m.trigger_pulses, m.trigger_missed,  m.trigger_worst_lateness_ns};
   for (std::size_t i = 0; i < counters.size(); ++i) {
     EXPECT_EQ(counters[i], static_cast<std::int64_t>(i) + 1);
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <numeric>
 #include <semaphore>
@@ -16,6 +17,7 @@
 #include <posed/status_t.hpp>
 
 #include "core/thread.h"
+#include "tests/unit/daemon/fake_gpio_lines.h"
 #include "tests/unit/daemon/fake_transport.h"
 #include "tests/unit/daemon/fakes.h"
 
@@ -42,6 +44,7 @@ class PipelineTest : public ::testing::Test {
     parts.transport = std::make_unique<FakeTransport>(log_);
     AppOptions options;
     options.on_estimate = [this](const PoseEstimate& estimate) { estimates_.push_back(estimate); };
+    options.gpio = gpio_;
     options.on_source_error = [this](const Error&) { source_errors_++; };
     Result<std::unique_ptr<App>> app = make_pipeline(config_, std::move(options), SystemClock::instance(), std::move(parts));
     EXPECT_TRUE(app) << (app ? "" : app.error().message);
@@ -67,6 +70,7 @@ class PipelineTest : public ::testing::Test {
   std::shared_ptr<TransportLog> log_ = std::make_shared<TransportLog>();
   std::vector<PoseEstimate> estimates_;  // written by the publisher thread, read after it has drained
   std::atomic<int> source_errors_{0};
+  const GpioLines* gpio_ = nullptr;
 };
 
 TEST_F(PipelineTest, LockstepPublishesEveryFrameInOrder) {
@@ -347,6 +351,62 @@ TEST_F(PipelineTest, RefusesQueuesThatHaveNoPlace) {
   EXPECT_EQ(refused(), "");
   config_.pipeline.keyframe_queue = 0;
   EXPECT_NE(refused().find("keyframe_queue"), std::string::npos);
+}
+
+TEST_F(PipelineTest, NoPosesAreMadeWhilePaused) {
+  std::atomic<bool> ended{false};
+  FakeGpioLines gpio;
+  gpio.report.trigger_pulses = 77;
+  gpio_ = &gpio;
+  const auto app = make(
+      [&](std::uint64_t) {
+        std::this_thread::sleep_for(std::chrono::microseconds(500));
+        return ended ? CaptureKind::EndOfStream : CaptureKind::Frame;
+      },
+      Pacing::Realtime);
+  const auto reaches = [&](auto condition) {
+    for (const TimeNs end_ns = SystemClock::instance().now_ns() + kLong; SystemClock::instance().now_ns() < end_ns;) {
+      if (condition(app->health())) {
+        return true;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return false;
+  };
+  const auto is_drained = [](const HealthReport& health) {
+    return health.frames_paused > 0 &&
+           health.frames_captured == health.frames_paused + health.frames_dropped + health.poses_published + health.poses_dropped;
+  };
+  ASSERT_TRUE(app->start());
+  EXPECT_TRUE(reaches([](const HealthReport& health) { return health.poses_published >= 10; }));
+  app->set_paused(true);
+  EXPECT_TRUE(app->health().paused);
+  ASSERT_TRUE(reaches(is_drained));
+  const HealthReport paused = app->health();
+  EXPECT_TRUE(reaches([&](const HealthReport& health) { return health.frames_paused >= paused.frames_paused + 50; }));
+  EXPECT_EQ(app->health().poses_published, paused.poses_published);
+  EXPECT_EQ(app->health().frames_tracked, paused.frames_tracked);
+
+  app->set_paused(false);
+  EXPECT_TRUE(reaches([&](const HealthReport& health) { return health.poses_published >= paused.poses_published + 10; }));
+  EXPECT_FALSE(app->health().paused);
+  EXPECT_EQ(app->health().gpio.trigger_pulses, 77U);
+  ended = true;
+  ASSERT_TRUE(app->wait_finished(kLong));
+  app->stop();
+  EXPECT_EQ(app->health().frames_missed, 0U);
+  EXPECT_EQ(log_->decoded<status_t>("T_STATUS").back().trigger_pulses, 77);
+}
+
+TEST_F(PipelineTest, LockstepIsNeverPaused) {
+  const auto app = make(FakeSource::recording(50), Pacing::Lockstep);
+  app->set_paused(true);
+  EXPECT_FALSE(app->health().paused);
+  ASSERT_TRUE(app->start());
+  ASSERT_TRUE(app->wait_finished(kLong));
+  app->stop();
+  EXPECT_EQ(sequences(), counting(50));
+  EXPECT_EQ(app->health().frames_paused, 0U);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <sys/un.h>
 
 #include "daemon/exit_code.h"
+#include "tests/unit/daemon/fake_gpio_lines.h"
 
 namespace posed {
 namespace {
@@ -28,6 +29,7 @@ class FakeApp final : public App {
   bool can_save = true;
   int save_requests = 0;
   int stops = 0;
+  bool paused = false;
 
   const SourceInfo& source_info() const override { return info_; }
   Status start() override {
@@ -36,7 +38,12 @@ class FakeApp final : public App {
   }
   bool wait_finished(TimeNs) override { return finished; }
   void stop() override { ++stops; }
-  HealthReport health() const override { return report; }
+  HealthReport health() const override {
+    HealthReport now = report;
+    now.paused = paused;
+    return now;
+  }
+  void set_paused(bool value) override { paused = value; }
   Status request_map_save() override {
     ++save_requests;
     return can_save ? Status{} : make_error(ErrorCode::InvalidConfig, "map.file is empty");
@@ -115,6 +122,7 @@ TEST_F(SupervisorTest, OutlivesTheSourceOtherwise) {
       }
       return app.health();
     }
+    void set_paused(bool paused) override { app.set_paused(paused); }
     Status request_map_save() override { return app.request_map_save(); }
     std::optional<Se3> keyframe_pose(std::uint64_t) const override { return std::nullopt; }
   } late(app_);
@@ -176,6 +184,100 @@ TEST_F(SupervisorTest, TakesSourceErrorsWithoutEverBlocking) {
   EXPECT_NE(log.find("rgb.txt:999"), std::string::npos);
   EXPECT_EQ(log.find("rgb.txt:0\n"), std::string::npos);
   EXPECT_NE(log.find("984 more errors"), std::string::npos);
+}
+
+TEST_F(SupervisorTest, TheEnableLinePausesFromTheStartOnAndTheLightShowsIt) {
+  FakeGpioLines gpio;
+  gpio.enabled_now = false;
+  app_.report.state = TrackingState::Tracking;
+  bool paused_at_start = false;
+  app_.on_start = [&] { paused_at_start = app_.paused; };
+  int looks = 0;
+  gpio.on_show = [&](LightState) {
+    switch (++looks) {
+      case 3: gpio.enabled_now = true; break;
+      case 6: app_.report.source.connected = false; break;
+      case 9: gpio.enabled_now = false; break;
+      case 12: kill(getpid(), SIGTERM); break;
+      default: break;
+    }
+  };
+  Supervisor supervisor(options_);
+  ::testing::internal::CaptureStderr();
+  ASSERT_TRUE(supervisor.run(app_, &gpio));
+  const std::string log = ::testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(paused_at_start);
+  EXPECT_TRUE(app_.paused);
+  EXPECT_EQ(gpio.shown,
+            (std::vector<LightState>{LightState::Paused, LightState::Tracking, LightState::WaitingForCamera, LightState::Paused}));
+  const std::size_t paused = log.find("paused by the enable line");
+  const std::size_t running = log.find("running: the enable line is active");
+  ASSERT_NE(paused, std::string::npos) << log;
+  ASSERT_NE(running, std::string::npos) << log;
+  EXPECT_LT(paused, running);
+  EXPECT_NE(log.find("paused by the enable line", running), std::string::npos) << log;
+}
+
+TEST_F(SupervisorTest, WithoutLinesNothingIsPaused) {
+  options_.exit_at_end = true;
+  app_.finished = true;
+  Supervisor supervisor(options_);
+  ASSERT_TRUE(supervisor.run(app_));
+  EXPECT_FALSE(app_.paused);
+}
+
+TEST_F(SupervisorTest, LogsWhatTheLinesTell) {
+  Supervisor supervisor(options_);
+  supervisor.gpio_error_sink()({ErrorCode::Unavailable, "line 3 is taken"});
+  FakeGpioLines gpio;
+  app_.report.gpio.ok = false;
+  int looks = 0;
+  gpio.on_show = [&](LightState) {
+    ++looks;
+    if (looks == 2) {
+      app_.report.gpio.ok = true;
+    } else if (looks == 4) {
+      kill(getpid(), SIGTERM);
+    }
+  };
+  ::testing::internal::CaptureStderr();
+  ASSERT_TRUE(supervisor.run(app_, &gpio));
+  const std::string log = ::testing::internal::GetCapturedStderr();
+  EXPECT_NE(log.find("gpio: line 3 is taken"), std::string::npos) << log;
+  EXPECT_NE(log.find("gpio: waiting for a line"), std::string::npos) << log;
+  EXPECT_NE(log.find("gpio: every line is held"), std::string::npos) << log;
+}
+
+TEST(LightState, FollowsTheReport) {
+  HealthReport health;
+  EXPECT_EQ(light_state(health), LightState::Initializing);
+  health.state = TrackingState::Tracking;
+  EXPECT_EQ(light_state(health), LightState::Tracking);
+  health.state = TrackingState::Lost;
+  EXPECT_EQ(light_state(health), LightState::Lost);
+  health.state = TrackingState::Relocalizing;
+  EXPECT_EQ(light_state(health), LightState::Lost);
+  health.source_failed = true;
+  EXPECT_EQ(light_state(health), LightState::WaitingForCamera);
+  health.source_failed = false;
+  health.source.connected = false;
+  EXPECT_EQ(light_state(health), LightState::WaitingForCamera);
+  health.paused = true;
+  EXPECT_EQ(light_state(health), LightState::Paused);
+}
+
+TEST(DescribeHealth, TellsOfPausesAndLines) {
+  HealthReport health;
+  EXPECT_EQ(describe(health, 0).find("trigger"), std::string::npos);
+  EXPECT_EQ(describe(health, 0).find("pause"), std::string::npos);
+  health.paused = true;
+  health.frames_paused = 7;
+  health.gpio = {.ok = false, .trigger_pulses = 90, .trigger_missed = 2, .worst_trigger_lateness_ns = 250 * kNsPerUs};
+  const std::string line = describe(health, 30);
+  EXPECT_NE(line.find("initializing, paused, 30.0 frames/s"), std::string::npos) << line;
+  EXPECT_NE(line.find("frames let go while paused 7"), std::string::npos) << line;
+  EXPECT_NE(line.find("a GPIO line is missing"), std::string::npos) << line;
+  EXPECT_NE(line.find("trigger pulses 90, missed 2, at most 0.250 ms late"), std::string::npos) << line;
 }
 
 TEST(DescribeHealth, NamesStateRateAndLosses) {

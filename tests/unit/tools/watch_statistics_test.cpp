@@ -111,6 +111,18 @@ TEST(WatchTable, ShowsPoseAndHealth) {
   EXPECT_TRUE(table.ends_with("\n"));
 }
 
+TEST(WatchTable, TellsOfPausesAndLinesWhereThereAreSome) {
+  HealthReport health;
+  EXPECT_THAT(format_watch_table(WatchStatistics(std::nullopt), health), Not(HasSubstr("trigger")));
+  EXPECT_THAT(format_watch_table(WatchStatistics(std::nullopt), health), Not(HasSubstr("paused")));
+  health.paused = true;
+  health.gpio = {.ok = false, .trigger_pulses = 300, .trigger_missed = 1, .worst_trigger_lateness_ns = 120 * kNsPerUs};
+  const std::string table = format_watch_table(WatchStatistics(std::nullopt), health);
+  EXPECT_THAT(table, HasSubstr("a GPIO line is missing\n"));
+  EXPECT_THAT(table, HasSubstr("trigger    300 pulses  1 missed  at most 0.120 ms late\n"));
+  EXPECT_THAT(table, HasSubstr("MB at most, paused\n"));
+}
+
 TEST(WatchTable, ShowsNoNumbersWhereThereIsNoPose) {
   WatchStatistics statistics(std::nullopt);
   statistics.observe(sample(0, TrackingState::Lost));
