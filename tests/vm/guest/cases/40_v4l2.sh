@@ -1,0 +1,267 @@
+# shellcheck shell=bash disable=SC2154  # variables of lib.sh
+# V4L2 cameras through posed: colour from one simulated camera, depth from another. Both belong to one device, so they are plugged together.
+
+readonly color_node=/dev/video0
+readonly depth_node=/dev/video1
+
+plug_cameras() { load_vivid n_devs=2 node_types=0x1,0x1; }
+
+# write_v4l2_config FORMAT [NODE]: colour in this format, and 16 bits of depth, 640x480. The two cameras run free of each other, so two
+# images of one pair are up to half a period apart. What comes on standard input goes into the table source.v4l2.
+write_v4l2_config() {
+  {
+    printf '[source.v4l2]\ndevice = "%s"\nformat = "%s"\n' "${2:-$color_node}" "$1"
+    cat
+    cat <<END
+
+[source]
+kind = "v4l2"
+
+[source.depth]
+device = "$depth_node"
+format = "y16"
+
+[source.live]
+rate_hz = 10.0
+max_stamp_difference_s = 0.05
+
+[camera]
+calibration = "synthetic_vga.toml"
+END
+  } | write_config
+}
+
+# start_streaming FORMAT: posed with frames that come.
+start_streaming() {
+  plug_cameras
+  write_v4l2_config "$1" </dev/null
+  start_posed
+  expect_log 30 'source: frames come'
+  expect_poses 3
+}
+
+unplug_cameras() { echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind; }
+
+plug_cameras_again() {
+  echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
+  udevadm settle
+}
+
+# expect_return TIMES: frames come again, and at its end posed has counted how often they did.
+expect_return() {
+  expect_log 30 'source: frames come' $(($1 + 1))
+  expect_poses 3
+  end_posed
+  expect_log 1 "camera back $1 times"
+}
+
+# Frames of two cameras, colour and depth, in each format that vivid and posed have, and in the one that posed takes by itself.
+case_v4l2_formats() {
+  plug_cameras
+  local format
+  for format in yuyv nv12 rgb24 bgr24 grey auto; do
+    echo "---- $format"
+    : >posed.log
+    write_v4l2_config $format </dev/null
+    start_posed
+    expect_log 30 'source: frames come'
+    expect_poses 3
+    end_posed
+  done
+}
+
+# Both cameras are unplugged while they stream, and plugged in again.
+case_v4l2_unplugged() {
+  start_streaming yuyv
+  unplug_cameras
+  expect_log 15 'source: no frames; waiting for the camera' 2
+  sleep 2
+  kill -0 "$posed" || fail "posed ended"
+  plug_cameras_again
+  expect_return 1
+}
+
+# The depth camera alone goes away while it streams: no frames without depth; all is well when the cameras are plugged in again.
+case_v4l2_depth_unplugged() {
+  start_streaming yuyv
+  v4l2-ctl -d "$depth_node" -c disconnect=1
+  expect_log 15 'source: no frames; waiting for the camera' 2
+  expect_log 1 "source: $depth_node"
+  unplug_cameras
+  plug_cameras_again
+  expect_return 1
+}
+
+# Unplugged and plugged in again three times in a row.
+case_v4l2_unplugged_often() {
+  start_streaming yuyv
+  local round
+  for round in 1 2 3; do
+    unplug_cameras
+    expect_log 15 'source: no frames; waiting for the camera' "$((round + 1))"
+    plug_cameras_again
+    expect_log 30 'source: frames come' "$((round + 1))"
+  done
+  expect_poses 3
+  end_posed
+  expect_log 1 'camera back 3 times'
+}
+
+# A camera that is not there at the start is waited for.
+case_v4l2_plugged_late() {
+  write_v4l2_config auto </dev/null
+  start_posed
+  expect_log 30 'running: '
+  expect_log 10 'source: .*/dev/video.: open'
+  plug_cameras
+  expect_log 30 'source: frames come'
+  expect_poses 3
+  end_posed
+}
+
+# The driver reports a fatal error (poll fails, then EIO): the camera is opened again.
+case_v4l2_fatal_error() {
+  start_streaming yuyv
+  v4l2-ctl -d "$color_node" -c inject_fatal_streaming_error=1
+  expect_log 15 "source: $color_node"
+  expect_log 30 'source: frames come' 2
+  expect_poses 3
+  end_posed
+  expect_log 1 'camera back 1 times'
+}
+
+# The driver refuses to set up buffers, to queue one, to start streaming: told by name each time, and tried until it works.
+case_v4l2_start_errors() {
+  plug_cameras
+  write_v4l2_config yuyv </dev/null
+  local error
+  for error in reqbufs qbuf streamon; do
+    : >posed.log
+    v4l2-ctl -d "$color_node" -c "inject_vidioc_${error}_error=1"
+    start_posed
+    expect_log 30 "source: $color_node: ${error^^}"
+    expect_log 30 'source: frames come'
+    end_posed
+  done
+}
+
+# A buffer that the driver marks as bad is left out, and told.
+case_v4l2_bad_buffer() {
+  start_streaming yuyv
+  v4l2-ctl -d "$color_node" -c inject_v4l2_buf_flag_error=1
+  expect_log 15 "source: $color_node"
+  expect_poses 3
+  end_posed
+}
+
+# A camera that falls silent is opened again, until it delivers.
+case_v4l2_silent() {
+  start_streaming yuyv
+  v4l2-ctl -d "$color_node" -c percentage_of_dropped_buffers=100
+  expect_log 20 'no frame for'
+  v4l2-ctl -d "$color_node" -c percentage_of_dropped_buffers=0
+  expect_log 30 'source: frames come' 2
+  expect_poses 3
+  end_posed
+  expect_log 1 'silent [1-9][0-9]* times'
+}
+
+# A driver that loses half of its buffers: the others make poses, and the lost ones are counted.
+case_v4l2_lossy() {
+  start_streaming yuyv
+  v4l2-ctl -d "$color_node" -c percentage_of_dropped_buffers=50
+  expect_poses 10
+  end_posed
+  expect_log 1 'not processed [1-9]'
+}
+
+# Sequence numbers of the device that wrap around: no gap of four billion frames is counted.
+case_v4l2_sequence_wraps() {
+  plug_cameras
+  v4l2-ctl -d "$color_node" -c wrap_sequence_number=1
+  write_v4l2_config yuyv </dev/null
+  start_posed
+  expect_log 30 'source: frames come'
+  expect_poses 10
+  sleep 15
+  end_posed
+  local missed
+  missed=$(sed -n 's/.*not processed \([0-9]*\);.*/\1/p' posed.log | tail -n 1)
+  [ "$missed" -lt 1000 ] || fail "$missed frames were not processed"
+}
+
+# Stamps of the colour camera that leap by centuries are told, and its images are not paired with depth until they are right again.
+case_v4l2_stamps_leap() {
+  start_streaming yuyv
+  v4l2-ctl -d "$color_node" -c wrap_timestamp=1
+  expect_log 20 'source: .'
+  v4l2-ctl -d "$color_node" -c wrap_timestamp=0
+  expect_poses 5
+  end_posed
+}
+
+# A camera that another program streams from is told to be busy, and taken when it is free.
+case_v4l2_busy() {
+  plug_cameras
+  set_format "$color_node" YUYV 640 480
+  v4l2-ctl -d "$color_node" --stream-mmap=4 --stream-to=/dev/null >/dev/null 2>&1 &
+  local other=$!
+  sleep 2
+  write_v4l2_config yuyv </dev/null
+  start_posed
+  expect_log 30 "source: $color_node.*(busy|another program)"
+  kill "$other"
+  expect_log 30 'source: frames come'
+  expect_poses 3
+  end_posed
+}
+
+# Controls of the configuration are set, also after the camera was away.
+case_v4l2_controls() {
+  plug_cameras
+  echo 'controls = ["brightness=77", "horizontal_flip=1"]' | write_v4l2_config yuyv
+  start_posed
+  expect_log 30 'source: frames come'
+  [ "$(v4l2-ctl -d "$color_node" -C brightness)" = "brightness: 77" ] || fail "the brightness is not set"
+  unplug_cameras
+  expect_log 15 'source: no frames' 2
+  plug_cameras_again
+  expect_log 30 'source: frames come' 2
+  [ "$(v4l2-ctl -d "$color_node" -C brightness)" = "brightness: 77" ] || fail "the brightness is not set again"
+  [ "$(v4l2-ctl -d "$color_node" -C horizontal_flip)" = "horizontal_flip: 1" ] || fail "the flip is not set again"
+  end_posed
+}
+
+# A control that the camera does not have is named in the log.
+case_v4l2_unknown_control() {
+  plug_cameras
+  echo 'controls = ["brightnes=77"]' | write_v4l2_config yuyv
+  start_posed
+  expect_log 30 'source: .*brightnes'
+  end_posed
+}
+
+# A format and a size that the camera does not have are refused by name.
+case_v4l2_refusals() {
+  plug_cameras
+  write_v4l2_config mjpeg </dev/null
+  start_posed
+  expect_log 30 'source: .*mjpeg'
+  end_posed
+  write_v4l2_config yuyv </dev/null
+  sed -i 's/synthetic_vga/synthetic/' case.toml
+  start_posed
+  expect_log 30 'source: .*320x240'
+  end_posed
+}
+
+# As a service's user of its own in the group `video`, posed opens the cameras.
+case_v4l2_as_service() {
+  plug_cameras
+  write_v4l2_config yuyv </dev/null
+  chmod 755 /run/case
+  systemd-run --quiet --unit=posed --service-type=notify --property=DynamicUser=yes --property=SupplementaryGroups=video \
+    --property=DevicePolicy=closed --property='DeviceAllow=char-video4linux rw' \
+    /usr/local/bin/posed --config /run/case/case.toml
+  expect_poses 5
+}
