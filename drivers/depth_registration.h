@@ -23,6 +23,9 @@ class DepthRegistration {
   /// depth camera saw nothing. Every pixel of `depth_m` is written. The views have the sizes of the two images.
   void apply(ImageView<const std::uint16_t> raw, ImageView<float> depth_m) const;
 
+  /// Half the size of a depth pixel in the colour image [pixels], where it is equally far from both cameras.
+  Eigen::Vector2f half_patch() const { return {half_patch_x_, half_patch_y_}; }
+
  private:
   /// The colour camera at z = 1 [metres], in single precision.
   struct Lens {
