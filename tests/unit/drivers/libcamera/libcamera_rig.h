@@ -13,7 +13,7 @@
 #include "drivers/camera_source.h"
 #include "drivers/libcamera/libcamera_camera.h"
 #include "tests/support/fake_v4l2.h"
-#include "tests/support/stepping_clock.h"
+#include "tests/support/scripted_clock.h"
 #include "tests/unit/drivers/libcamera/fake_color_camera.h"
 
 namespace posed::test {
@@ -85,7 +85,7 @@ struct LibcameraRig {
     return got;
   }
 
-  SteppingClock clock;
+  ScriptedClock clock;
   FakeKernel kernel{clock};
   FakeColorCamera color{clock, kWidth, kHeight};
   RigSystem system{kernel, color, clock};
