@@ -1,7 +1,7 @@
 # Colour cameras by libcamera, with depth from a V4L2 node. drivers/CMakeLists.txt includes it after v4l2/v4l2.cmake.
 option(POSED_LIBCAMERA "Cameras by libcamera" ON)
 if(POSED_LIBCAMERA)
-  pkg_check_modules(LIBCAMERA IMPORTED_TARGET libcamera)
+  pkg_check_modules(LIBCAMERA IMPORTED_TARGET GLOBAL libcamera)
   if(NOT LIBCAMERA_FOUND)
     message(STATUS "No libcamera (libcamera-dev): built without cameras by libcamera (POSED_LIBCAMERA)")
     set(POSED_LIBCAMERA OFF CACHE BOOL "Cameras by libcamera" FORCE)
