@@ -21,7 +21,6 @@ start_with_lines() {
   pull 3 up
   write_gpio_config
   start_posed
-  expect_log 30 'running: '
 }
 
 expect_blinking() {
@@ -91,7 +90,7 @@ case_gpio_line_taken() {
   wait_until 5 bash -c "gpioinfo $gpio_chip | grep -E 'line +0:' | grep -q gpioset" || fail "gpioset does not take the line"
   write_gpio_config
   start_posed
-  expect_log 30 'gpio: .*(line 0|0).*(use|taken|busy)'
+  expect_log 30 'gpio: .*line 0 of .*busy'
   expect_poses 3
   end_posed
 }
