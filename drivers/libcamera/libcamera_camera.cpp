@@ -68,7 +68,6 @@ void LibcameraCamera::close() noexcept {
   eventfd_read(wake_.get(), &count);
   disconnected_.store(false, std::memory_order_relaxed);
   failed_.reset();
-  pairer_.clear();
   stamps_.restart();
 }
 

@@ -44,6 +44,10 @@ void set_automatic(std::string_view what, const std::string& uri, openni::Status
 
 }  // namespace
 
+OpenNi2Device::OpenNi2Device(const OpenNi2Config& config, const OpenNi2Wish& wish) : config_(config), wish_(wish) {
+  static_cast<void>(runtime_.hold());  // where it fails, `open` tries again and tells
+}
+
 Status OpenNi2Device::open(bool frame_sync) {
   Status opened = open_all(frame_sync);
   if (!opened) {

@@ -27,7 +27,8 @@ class OpenNi2Device {
     OpenNi2PlaybackGate gate;
   };
 
-  OpenNi2Device(const OpenNi2Config& config, const OpenNi2Wish& wish) : config_(config), wish_(wish) {}
+  /// Initialises OpenNI2, if it can, in the thread that will destroy this (see OpenNi2Runtime).
+  OpenNi2Device(const OpenNi2Config& config, const OpenNi2Wish& wish);
   ~OpenNi2Device() { close(); }
   OpenNi2Device(const OpenNi2Device&) = delete;
   OpenNi2Device& operator=(const OpenNi2Device&) = delete;

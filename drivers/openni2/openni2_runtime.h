@@ -8,7 +8,9 @@
 namespace posed {
 
 /// Holds OpenNI2 initialised: the one place in the process that does so. The last holder shuts it down. Initialising changes the
-/// process's working directory for a moment (OpenNI2 does). Reentrant.
+/// process's working directory for a moment (OpenNI2 does). A thread's first call of OpenNI2 (2.2.0.33) looks at every thread that
+/// called it before, and crashes where one of them has ended: a thread that destroys what another used must have called it in time,
+/// as `hold` does. Reentrant.
 class OpenNi2Runtime {
  public:
   OpenNi2Runtime() = default;

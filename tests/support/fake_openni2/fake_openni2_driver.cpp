@@ -117,6 +117,7 @@ class Stream final : public oni::driver::StreamBase {
       case ONI_STREAM_PROPERTY_VIDEO_MODE: return put(owner_.mode(sensor_), data, size);
       case ONI_STREAM_PROPERTY_MIRRORING: return put<OniBool>(owner_.mirrored(sensor_) ? TRUE : FALSE, data, size);
       case ONI_STREAM_PROPERTY_CROPPING: return put(OniCropping{}, data, size);
+      case ONI_STREAM_PROPERTY_STRIDE: return put(stride(), data, size);
       case ONI_STREAM_PROPERTY_HORIZONTAL_FOV:
       case ONI_STREAM_PROPERTY_VERTICAL_FOV: return put(kFieldOfView, data, size);
       case ONI_STREAM_PROPERTY_MAX_VALUE: return put(10'000, data, size);
@@ -188,6 +189,15 @@ class Stream final : public oni::driver::StreamBase {
   Known& owner() { return owner_; }
 
  private:
+  int stride() const {
+    const OniVideoMode& mode = owner_.mode(sensor_);
+    switch (mode.pixelFormat) {
+      case ONI_PIXEL_FORMAT_RGB888: return 3 * mode.resolutionX;
+      case ONI_PIXEL_FORMAT_GRAY8: return mode.resolutionX;
+      default: return 2 * mode.resolutionX;
+    }
+  }
+
   OniStatus set_mode(const OniVideoMode& mode) {
     const std::vector<int>& refused = owner_.camera.refused_formats;
     if (std::find(refused.begin(), refused.end(), mode.pixelFormat) != refused.end()) {

@@ -41,6 +41,7 @@ TEST_F(LibcameraCameraTest, DeliversPairsOfOneInstant) {
       first_ns = frame->capture_ns;
     }
     EXPECT_EQ(frame->sequence, first + i);
+    EXPECT_EQ(rig_.clock.now_ns() - frame->capture_ns, rig_.color.delay_ns) << "a completed image wakes the reader at once";
     EXPECT_EQ(frame->capture_ns, first_ns + static_cast<TimeNs>(i) * from_seconds(1.0 / 30)) << "the colour image's stamp";
     for (int y = 0; y < LibcameraRig::kHeight; ++y) {
       for (int x = 0; x < LibcameraRig::kWidth; ++x) {
@@ -119,6 +120,7 @@ TEST_F(LibcameraCameraTest, ADamagedImageIsToldAndTheNextOneComes) {
   }
   using enum CameraReadKind;
   EXPECT_EQ(kinds, (std::vector<CameraReadKind>{Frame, Frame, Frame, BadFrame, Frame, Frame}));
+  EXPECT_EQ(rig_.color.queued(), rig_.color.buffers) << "also the damaged image's buffer is given back";
 }
 
 TEST_F(LibcameraCameraTest, StampsOfAnotherClockAreMapped) {
@@ -136,6 +138,24 @@ TEST_F(LibcameraCameraTest, StampsOfAnotherClockAreMapped) {
     last_ns = frame->capture_ns;
   }
   EXPECT_EQ(camera->metrics().clock_resets.value(), 1U);
+
+  camera->close();
+  rig_.color.clock_offset_ns = 0;
+  ASSERT_TRUE(camera->open());
+  FrameWriter frame = slot();
+  ASSERT_EQ(rig_.read(*camera, &*frame).kind, CameraReadKind::Frame);
+  EXPECT_EQ(rig_.clock.now_ns() - frame->capture_ns, rig_.color.delay_ns) << "one that is opened again is believed again";
+}
+
+TEST_F(LibcameraCameraTest, AFailureIsForgottenWhenItIsOpenedAgain) {
+  const auto camera = rig_.camera();
+  ASSERT_TRUE(camera->open());
+  rig_.color.give_back_error = Error{ErrorCode::Io, "no buffer is taken back"};
+  ASSERT_EQ(rig_.read(*camera, nullptr).kind, CameraReadKind::Frame);
+  camera->close();
+  rig_.color.give_back_error.reset();
+  ASSERT_TRUE(camera->open());
+  EXPECT_EQ(rig_.read(*camera, nullptr).kind, CameraReadKind::Frame);
 }
 
 TEST_F(LibcameraCameraTest, MoreBuffersThanThereArePlacesAreRefused) {

@@ -18,10 +18,10 @@
 
 namespace posed::test {
 
-/// The kernel of the depth camera, which lets the colour camera complete its images while somebody waits.
-class RigSystem final : public V4l2System {
+/// The kernel of the depth camera, but for the waiting.
+class ForwardingSystem : public V4l2System {
  public:
-  RigSystem(FakeKernel& kernel, FakeColorCamera& color, const Clock& clock) : kernel_(kernel), color_(color), clock_(clock) {}
+  explicit ForwardingSystem(FakeKernel& kernel) : kernel_(kernel) {}
 
   int open(const char* path) override { return kernel_.open(path); }
   int close(int descriptor) override { return kernel_.close(descriptor); }
@@ -30,6 +30,16 @@ class RigSystem final : public V4l2System {
     return kernel_.map(descriptor, length, offset, address);
   }
   int unmap(void* address, std::size_t length) override { return kernel_.unmap(address, length); }
+
+ protected:
+  FakeKernel& kernel_;
+};
+
+/// Lets the colour camera complete its images while somebody waits.
+class RigSystem final : public ForwardingSystem {
+ public:
+  RigSystem(FakeKernel& kernel, FakeColorCamera& color, const Clock& clock)
+      : ForwardingSystem(kernel), color_(color), clock_(clock) {}
 
   int poll(std::span<pollfd> waited, TimeNs timeout_ns) override {
     const TimeNs deadline_ns = clock_.now_ns() + std::max<TimeNs>(0, timeout_ns);
@@ -45,7 +55,6 @@ class RigSystem final : public V4l2System {
   }
 
  private:
-  FakeKernel& kernel_;
   FakeColorCamera& color_;
   const Clock& clock_;
 };
