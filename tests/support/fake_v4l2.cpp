@@ -68,9 +68,9 @@ void FakeKernel::silence(const std::string& path, TimeNs until_ns) {
   nodes_.at(path)->silent_until_ns = until_ns;
 }
 
-void FakeKernel::break_streaming(const std::string& path) {
+void FakeKernel::break_streaming(const std::string& path, int error) {
   for (auto& [descriptor, file] : files_) {
-    file.broken = file.broken || file.node == nodes_.at(path).get();
+    file.broken = file.node == nodes_.at(path).get() ? error : file.broken;
   }
 }
 
@@ -296,8 +296,8 @@ int FakeKernel::dequeue_buffer(File& file, v4l2_buffer& buffer) {
     violation("DQBUF without streaming");
     return -EINVAL;
   }
-  if (file.broken) {
-    return -EIO;
+  if (file.broken != 0) {
+    return -file.broken;
   }
   if (file.done.empty()) {
     return -EAGAIN;
@@ -322,7 +322,7 @@ int FakeKernel::stream_on(File& file) {
 
 int FakeKernel::stream_off(File& file) {
   file.streaming = false;
-  file.broken = false;
+  file.broken = 0;
   file.queued.clear();
   file.done.clear();
   for (Buffer& buffer : file.buffers) {
@@ -364,7 +364,7 @@ TimeNs FakeKernel::arrival_of_next(File& file) const {
 
 /// Fills buffers with the images that have come until now. Without a buffer an image is lost, and counted.
 void FakeKernel::produce(File& file, int descriptor) {
-  if (!file.streaming || !is_alive(file) || file.broken) {
+  if (!file.streaming || !is_alive(file) || file.broken != 0) {
     return;
   }
   const FakeCamera& camera = file.node->camera;
@@ -407,7 +407,7 @@ short FakeKernel::events_of(File& file, int descriptor) {
     return POLLERR | POLLHUP;
   }
   produce(file, descriptor);
-  if (file.broken || !file.streaming) {
+  if (file.broken != 0 || !file.streaming) {
     return POLLERR;
   }
   return file.done.empty() ? short{0} : short{POLLIN};

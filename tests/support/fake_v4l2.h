@@ -1,21 +1,19 @@
 #pragma once
 
+#include <cerrno>
 #include <deque>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <linux/videodev2.h>
 
-#include "core/clock.h"
 #include "drivers/v4l2/v4l2_system.h"
 
-/// A kernel with cameras that exist only in a test. It keeps to what the V4L2 documentation promises, byte by byte, and notes each
-/// call that a real kernel would refuse or that would leak. Descriptors and mappings are real ones, so that the process's own
-/// counts tell of leaks, too. Thread-bound.
+/// A kernel with cameras that exist only in a test. It keeps to what V4L2's documentation promises, and notes each call that a real
+/// kernel would refuse. Descriptors and mappings are real ones, so that the process's own counts tell of leaks, too. Thread-bound.
 namespace posed::test {
 
 struct FakeFormat {
@@ -74,7 +72,7 @@ class FakeKernel final : public V4l2System {
   void replug(const std::string& path);
 
   void silence(const std::string& path, TimeNs until_ns);
-  void break_streaming(const std::string& path);                           ///< POLLERR and EIO until it is opened again
+  void break_streaming(const std::string& path, int error = EIO);          ///< of DQBUF, with POLLERR, until it is opened again
   void refuse(const std::string& path, unsigned long request, int error);  ///< the next such call; 0 as request: open
   void count_from(const std::string& path, std::uint64_t sequence);        ///< images of streams that begin from now on
 
@@ -109,7 +107,7 @@ class FakeKernel final : public V4l2System {
     std::uint64_t generation = 0;
     v4l2_pix_format format{};
     bool streaming = false;
-    bool broken = false;
+    int broken = 0;  // errno
     std::vector<Buffer> buffers;
     std::deque<std::uint32_t> queued;
     std::deque<std::uint32_t> done;

@@ -187,6 +187,15 @@ TEST_F(V4l2Faults, AnErrorOfTheStream) {
   expect_frames_again(clock_.now_ns());
 }
 
+TEST_F(V4l2Faults, ADeviceThatHangsUpAndSaysNoMore) {
+  run_for(1.0);
+  forget();
+  kernel_.break_streaming(kColorPath, EAGAIN);
+  run_for(0.03);
+  EXPECT_THAT(interruptions_, Contains(AllOf(HasSubstr(kColorPath), HasSubstr("hung up"))));
+  expect_frames_again(clock_.now_ns());
+}
+
 TEST_F(V4l2Faults, ABufferThatCannotBeGivenBack) {
   run_for(1.0);
   forget();
@@ -242,6 +251,20 @@ TEST_F(V4l2Faults, DroppedImagesAreGapsInTheSequence) {
   color_->fate = nullptr;
   depth_->fate = nullptr;
   expect_frames_again(clock_.now_ns());
+}
+
+TEST_F(V4l2Faults, DepthThatComesLateFindsItsColour) {
+  depth_->delay_ns = 66 * kNsPerMs;  // nearly two periods
+  run_for(10.0);
+  EXPECT_NEAR(static_cast<double>(stamps_.size()), 297, 2);
+  EXPECT_EQ(source_->health().unpaired, 0U);
+  config_.v4l2.buffers = 8;
+  depth_->delay_ns = 180 * kNsPerMs;
+  source_ = source(pool_);
+  forget();
+  run_for(10.0);
+  EXPECT_NEAR(static_cast<double>(stamps_.size()), 294, 2);
+  EXPECT_EQ(source_->health().unpaired, 0U);
 }
 
 TEST_F(V4l2Faults, ASlowerDepthCameraCountsTheFrames) {

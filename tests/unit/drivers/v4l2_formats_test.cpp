@@ -14,6 +14,8 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
+constexpr double kRounding = 0.54;  // to a whole number, and 13 bits of the coefficients
+
 /// Reference of one pixel, in floating point: ITU-R BT.601 or BT.709.
 struct Rgb {
   double r, g, b, luma;
@@ -65,10 +67,10 @@ class V4l2Formats : public testing::Test, public V4l2Rig {
 
   void expect_pixel(int x, int y, const Rgb& expected) const {
     const RgbdFrame& frame = *const_cast<FrameWriter&>(*writer_);
-    EXPECT_NEAR(frame.bgr.row(y)[3 * x], expected.b, 0.51) << "blue of " << x << ", " << y;
-    EXPECT_NEAR(frame.bgr.row(y)[3 * x + 1], expected.g, 0.51) << "green of " << x << ", " << y;
-    EXPECT_NEAR(frame.bgr.row(y)[3 * x + 2], expected.r, 0.51) << "red of " << x << ", " << y;
-    EXPECT_NEAR(frame.gray.row(y)[x], expected.luma, 0.51) << "grey of " << x << ", " << y;
+    EXPECT_NEAR(frame.bgr.row(y)[3 * x], expected.b, kRounding) << "blue of " << x << ", " << y;
+    EXPECT_NEAR(frame.bgr.row(y)[3 * x + 1], expected.g, kRounding) << "green of " << x << ", " << y;
+    EXPECT_NEAR(frame.bgr.row(y)[3 * x + 2], expected.r, kRounding) << "red of " << x << ", " << y;
+    EXPECT_NEAR(frame.gray.row(y)[x], expected.luma, kRounding) << "grey of " << x << ", " << y;
   }
 
   std::string refusal() {

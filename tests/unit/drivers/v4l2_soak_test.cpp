@@ -13,7 +13,7 @@
 namespace posed::test {
 namespace {
 
-constexpr double kHours = 0.25;  // of the cameras' time; POSED_SOAK_HOURS=24 is the long run of docs/cameras-v4l2.md
+constexpr double kHours = 4;  // of the cameras' time; POSED_SOAK_HOURS=24 is the long run of docs/cameras-v4l2.md
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kOwnAllocator = true;  // a sanitizer's, which keeps what is freed
