@@ -87,9 +87,9 @@ inline void write_recording(const std::filesystem::path& folder, int frames, Col
       throw std::runtime_error(added.error().message);
     }
   }
-  const Status finished = writer ? writer->finish() : Status(tl::unexpected(writer.error()));
-  if (!finished) {
-    throw std::runtime_error(finished.error().message);
+  const Status committed = writer ? writer->commit() : Status(tl::unexpected(writer.error()));
+  if (!committed) {
+    throw std::runtime_error(committed.error().message);
   }
 }
 

@@ -18,7 +18,7 @@ constexpr const char* kExitCodes =
     "74 reading or writing failed; 78 wrong configuration or calibration file.";
 
 int parse_and_run(std::vector<std::string> arguments, const Console& console) {
-  CLI::App app("Tools around the pose daemon posed: replay, evaluate, watch, synthesise, detect.", "posectl");
+  CLI::App app("Tools around the pose daemon posed: replay, evaluate, watch, synthesise, record, detect.", "posectl");
   int exit_code = kExitOk;
   app.require_subcommand(1);
   app.footer(kExitCodes);
@@ -26,6 +26,7 @@ int parse_and_run(std::vector<std::string> arguments, const Console& console) {
   add_eval_command(app, console, exit_code);
   add_watch_command(app, console, exit_code);
   add_synth_command(app, console, exit_code);
+  add_record_command(app, console, exit_code);
   add_detect_command(app, console, exit_code);
   add_model_command(app, console, exit_code);
   add_check_config_command(app, console, exit_code);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <ostream>
+#include <utility>
 
 #include <fmt/ostream.h>
 
@@ -19,8 +20,9 @@ constexpr std::uint64_t kFramesPerStep = 1000;  // where the total is unknown
 std::string format_progress(const ProgressState& state) {
   const double elapsed_s = to_seconds(state.elapsed_ns);
   const double rate_hz = elapsed_s > 0 ? static_cast<double>(state.done) / elapsed_s : 0.0;
+  const std::string note = state.note.empty() ? "" : "  " + state.note;
   if (state.total == 0) {
-    return fmt::format("{} frames  {:.1f} Hz", state.done, rate_hz);
+    return fmt::format("{} frames  {:.1f} Hz{}", state.done, rate_hz, note);
   }
   const std::uint64_t done = std::min(state.done, state.total);
   const auto filled = static_cast<std::size_t>(done * kBarWidth / state.total);
@@ -29,14 +31,14 @@ std::string format_progress(const ProgressState& state) {
   if (done < state.total && rate_hz > 0) {
     line += fmt::format("  {:.0f} s left", static_cast<double>(state.total - done) / rate_hz);
   }
-  return line;
+  return line + note;
 }
 
 ProgressReporter::ProgressReporter(std::ostream& err, Style style, std::string_view label, std::uint64_t total, TimeNs start_ns)
     : err_(err), style_(style), label_(label), total_(total), start_ns_(start_ns) {}
 
-void ProgressReporter::update(std::uint64_t done, TimeNs now_ns) {
-  const ProgressState state{done, total_, now_ns - start_ns_};
+void ProgressReporter::update(std::uint64_t done, TimeNs now_ns, std::string note) {
+  const ProgressState state{done, total_, now_ns - start_ns_, std::move(note)};
   if (style_ == Style::Bar && now_ns >= next_draw_ns_) {
     next_draw_ns_ = now_ns + kRedrawPeriod_ns;
     draw_bar(state);
@@ -51,14 +53,14 @@ void ProgressReporter::update(std::uint64_t done, TimeNs now_ns) {
   }
 }
 
-void ProgressReporter::finish(std::uint64_t done, TimeNs now_ns) {
+void ProgressReporter::finish(std::uint64_t done, TimeNs now_ns, std::string note) {
   if (style_ == Style::Bar) {
-    draw_bar({done, total_, now_ns - start_ns_});
+    draw_bar({done, total_, now_ns - start_ns_, std::move(note)});
     err_ << '\n';
     err_.flush();
     return;
   }
-  update(done, now_ns);
+  update(done, now_ns, std::move(note));
 }
 
 void ProgressReporter::draw_bar(const ProgressState& state) {

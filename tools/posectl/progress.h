@@ -14,6 +14,7 @@ struct ProgressState {
   std::uint64_t done = 0;
   std::uint64_t total = 0;  ///< 0 where unknown
   TimeNs elapsed_ns = 0;
+  std::string note = {};  ///< stands at the end of the line
 };
 
 /// One line without its end: "[#####.....] 240/480  50 %  29.9 Hz  8 s left", or the count and the rate where the total is unknown.
@@ -30,10 +31,10 @@ class ProgressReporter {
   ProgressReporter(const ProgressReporter&) = delete;
   ProgressReporter& operator=(const ProgressReporter&) = delete;
 
-  void update(std::uint64_t done, TimeNs now_ns);
+  void update(std::uint64_t done, TimeNs now_ns, std::string note = {});
 
   /// Leaves the bar with its last state on the terminal and moves to the next line.
-  void finish(std::uint64_t done, TimeNs now_ns);
+  void finish(std::uint64_t done, TimeNs now_ns, std::string note = {});
 
  private:
   void draw_bar(const ProgressState& state);

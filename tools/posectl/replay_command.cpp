@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -25,13 +24,13 @@
 #include "tools/posectl/replay_config.h"
 #include "tools/posectl/replay_stats.h"
 #include "tools/posectl/report_error.h"
+#include "tools/posectl/source_errors.h"
 #include "tools/posectl/whole_file.h"
 
 namespace posed {
 namespace {
 
 constexpr TimeNs kWaitPeriod_ns = 50 * kNsPerMs;
-constexpr std::size_t kMaxErrorsShown = 10;
 constexpr std::size_t kFramesWhereUnknown = 100'000;  // room for an hour's poses
 
 struct ReplayOptions {
@@ -51,40 +50,6 @@ struct ReplayOptions {
   std::vector<std::filesystem::path> outputs() const {
     return {trajectory, online_trajectory, stats, groundtruth, detections, map_out};
   }
-};
-
-/// What the source complained of: the first few messages, and the last one, which tells why it failed. Thread-safe.
-class SourceErrors {
- public:
-  void add(const Error& error) {
-    const std::scoped_lock lock(mutex_);
-    ++count_;
-    last_ = error;
-    if (first_.size() < kMaxErrorsShown) {
-      first_.push_back(error.message);
-    }
-  }
-
-  void print(std::ostream& err) const {
-    const std::scoped_lock lock(mutex_);
-    for (const std::string& message : first_) {
-      fmt::print(err, "posectl: {}\n", message);
-    }
-    if (count_ > first_.size()) {
-      fmt::print(err, "posectl: and {} more such messages\n", count_ - first_.size());
-    }
-  }
-
-  Error last() const {
-    const std::scoped_lock lock(mutex_);
-    return last_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::size_t count_ = 0;
-  std::vector<std::string> first_;
-  Error last_{ErrorCode::Io, "the source has failed"};
 };
 
 std::uint64_t frames_done(const HealthReport& health) {
@@ -228,7 +193,7 @@ int run_replay(const ReplayOptions& options, const Console& console) {
   if (!stats) {
     return report_error(console.err, stats.error());
   }
-  source_errors.print(console.err);
+  source_errors.print_rest(console.err);
   const Status written =
       write_outputs(options, *stats, *recorder, **app, console.err)
           .and_then([&] { return options.groundtruth.empty() ? Status{} : write_truth(options.groundtruth, *config, *recorder); })

@@ -13,6 +13,7 @@
 #include "drivers/synthetic_camera.h"
 #include "drivers/tum_list.h"
 #include "drivers/tum_writer.h"
+#include "tools/posectl/camera_text.h"
 #include "tools/posectl/whole_file.h"
 
 namespace posed {
@@ -50,14 +51,6 @@ CameraIntrinsics primesense_camera(int width, int height) {
   camera.cy = 0.5 * (height - 1);
   camera.baseline_fx = vga.baseline_fx * scale;
   return camera;
-}
-
-std::string format_camera(const CameraIntrinsics& camera) {
-  return fmt::format(
-      "# The camera of this synthetic recording.\n[camera]\nwidth = {}\nheight = {}\nfx = {:#}\nfy = {:#}\ncx = {:#}\ncy = {:#}\n"
-      "distortion = [{:#}, {:#}, {:#}, {:#}, {:#}]  # k1, k2, p1, p2, k3\ndepth_units_per_metre = {:#}\nbaseline_fx = {:#}\n",
-      camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.k1, camera.k2, camera.p1, camera.p2,
-      camera.k3, camera.depth_units_per_metre, camera.baseline_fx);
 }
 
 std::uint64_t max_recording_bytes(const SynthRequest& request) {
@@ -117,8 +110,10 @@ Result<std::uint64_t> write_synthetic_recording(const SynthRequest& request, con
     }
     ++written;
   }
-  const Status finished =
-      writer->finish().and_then([&] { return write_whole_file(request.folder / "camera.toml", format_camera(request.camera)); });
+  const Status finished = writer->commit().and_then([&] {
+    return write_whole_file(request.folder / "camera.toml",
+                            format_camera(request.camera, "The camera of this synthetic recording."));
+  });
   return finished.map([written] { return written; });
 }
 

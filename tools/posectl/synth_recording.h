@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <string>
 
 #include "config/config.h"
 #include "core/pinhole_camera.h"
@@ -23,9 +22,6 @@ struct SynthRequest {
 /// Intrinsics of a PrimeSense sensor (525 pixels at a width of 640) at another resolution: same field of view across, square
 /// pixels, principal point in the middle.
 CameraIntrinsics primesense_camera(int width, int height);
-
-/// A calibration file for `camera`, as `load_camera` reads it.
-std::string format_camera(const CameraIntrinsics& camera);
 
 /// What a recording takes on the disk at most [bytes]: images as large as without compression.
 std::uint64_t max_recording_bytes(const SynthRequest& request);

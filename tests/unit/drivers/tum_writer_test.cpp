@@ -35,8 +35,8 @@ TEST(TumWriter, GroundTruthStandsWhereFramesCarryIt) {
   frame->stamp_utc_ns = 1'500'000'000;
   frame->T_world_camera_truth = Se3(Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0), {1.0, -2.0, 0.125});
   ASSERT_TRUE(writer->add_frame(*frame));
-  EXPECT_FALSE(std::filesystem::exists(folder.path() / "rgb.txt")) << "no list before the end";
-  ASSERT_TRUE(writer->finish());
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "rgb.txt")) << "no list before it is committed";
+  ASSERT_TRUE(writer->commit());
   EXPECT_EQ(text_of(folder.path() / "groundtruth.txt"),
             "# ground truth trajectory\n# timestamp tx ty tz qx qy qz qw\n"
             "1.500000000 1.000000000 -2.000000000 0.125000000 1.000000000 0.000000000 0.000000000 0.000000000\n");

@@ -51,13 +51,13 @@ Trajectory curve(int poses, double scale) {
 TEST(Posectl, HelpNamesSubcommandsAndExitCodes) {
   const Outcome outcome = posectl({"--help"});
   EXPECT_EQ(outcome.exit_code, kExitOk);
-  for (const char* text : {"replay", "eval", "watch", "synth", "model", "check-config", "version", "Exit codes", "78"}) {
+  for (const char* text : {"replay", "eval", "watch", "synth", "record", "model", "check-config", "version", "Exit codes", "78"}) {
     EXPECT_THAT(outcome.out, HasSubstr(text));
   }
 }
 
 TEST(Posectl, EverySubcommandHasHelp) {
-  for (const char* command : {"replay", "eval", "watch", "synth", "model", "check-config", "version"}) {
+  for (const char* command : {"replay", "eval", "watch", "synth", "record", "model", "check-config", "version"}) {
     EXPECT_EQ(posectl({command, "--help"}).exit_code, kExitOk) << command;
   }
 }
@@ -77,6 +77,10 @@ TEST(Posectl, AWrongCommandLineIsAUsageError) {
            {"replay", "--synthetic", "--duration", "-1"},
            {"replay", "--synthetic", "--localization-only"},
            {"replay", "--synthetic", "--map-in", "a", "--map-out", "b", "--localization-only"},
+           {"record"},
+           {"record", "x", "--duration", "-1"},
+           {"record", "x", "--jpeg-quality", "50"},
+           {"record", "x", "--min-free", "much"},
            {"synth"},
            {"synth", "--out", "x", "--frames", "3", "--duration", "3"},
            {"synth", "--out", "x", "--size", "big"},

@@ -9,6 +9,7 @@
 
 #include "config/config_loader.h"
 #include "tests/support/temporary_folder.h"
+#include "tools/posectl/camera_text.h"
 #include "tools/posectl/trajectory.h"
 
 namespace posed {
@@ -37,7 +38,7 @@ TEST(FormatCamera, IsReadBackByTheLoader) {
   const TemporaryFolder folder;
   CameraIntrinsics camera = primesense_camera(640, 480);
   camera.k1 = -0.123456789012345;
-  const Result<CameraIntrinsics> read = load_camera(folder.write("camera.toml", format_camera(camera)));
+  const Result<CameraIntrinsics> read = load_camera(folder.write("camera.toml", format_camera(camera, "Two\nlines.")));
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->width, 640);
   EXPECT_EQ(read->fx, camera.fx);
