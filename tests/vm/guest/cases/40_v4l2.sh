@@ -267,3 +267,43 @@ case_v4l2_as_service() {
     /usr/local/bin/posed --config /run/case/case.toml
   expect_poses 5
 }
+
+# record FOLDER FRAMES: with case.toml.
+record() { timeout 60 posectl record --config case.toml "$1" --frames "$2"; }
+
+# first_image FOLDER KIND: of a recording, `rgb` or `depth`, as a portable image on standard output.
+first_image() { pngtopnm "$1/$(sed -n '/^#/d; s/^[^ ]* //p' "$1/$2.txt" | head -n 1)"; }
+
+# What is recorded is what the camera sent: RGB exactly, as v4l2-ctl sees it, and 16 bits of depth exactly.
+case_v4l2_recorded_exactly() {
+  plug_cameras
+  local bars='controls = ["test_pattern=1", "osd_text_mode=2"]'
+  write_v4l2_config rgb24 <<<"$bars"
+  record bars 2
+  v4l2-ctl -d "$color_node" --stream-mmap=4 --stream-count=1 --stream-to=raw
+  first_image bars rgb | tail -c $((640 * 480 * 3)) >recorded
+  cmp recorded raw || fail "the recorded colours are not the camera's"
+  v4l2-ctl -d "$depth_node" --stream-mmap=4 --stream-count=1 --stream-to=raw
+  # A portable image has the high byte first, the camera's the low one.
+  first_image bars depth | tail -c $((640 * 480 * 2)) | dd conv=swab status=none >recorded
+  tail -c $((640 * 200 * 2)) raw >raw_end # below the texts in the image
+  tail -c $((640 * 200 * 2)) recorded >recorded_end
+  cmp recorded_end raw_end || fail "the recorded depth is not the camera's"
+}
+
+# Colour bars in YUV formats are recorded in the colours of the same bars in RGB, but for what half of the columns' colours lose.
+case_v4l2_colors() {
+  plug_cameras
+  local bars='controls = ["test_pattern=1", "osd_text_mode=2"]' format decibel
+  for format in rgb24 bgr24 yuyv nv12; do
+    write_v4l2_config $format <<<"$bars"
+    record $format 2
+    first_image $format rgb >$format.ppm
+  done
+  cmp rgb24.ppm bgr24.ppm || fail "BGR is not recorded as RGB is"
+  for format in yuyv nv12; do
+    for decibel in $(pnmpsnr -machine rgb24.ppm $format.ppm | tee /dev/stderr | tr -c '0-9.\n' ' '); do
+      awk "BEGIN { exit !($decibel > 30) }" || fail "$format differs from rgb24: PSNR $decibel dB"
+    done
+  done
+}
