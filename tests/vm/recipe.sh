@@ -12,6 +12,7 @@ vm_guest_packages=(
   gpiod                          # gpioset and gpioget, the same for lines
   libcamera-tools libcamera-ipa  # cam, and what the simulated camera's pipeline needs
   libjpeg-turbo-progs            # cjpeg, for a camera with JPEG images
+  netpbm                         # reads recorded images independently
 )
 
 # Modules of Debian's kernel package, and what they depend on: devices made of software.

@@ -17,7 +17,7 @@ case_vivid_streams() {
 case_gpio_sim_lines() {
   plug_gpio
   gpioset -m signal "$gpio_chip" 0=1 &
-  wait_until 5 grep -qx 1 "$gpio_lines/sim_gpio0/value" || fail "the line that gpioset drives stays low"
+  wait_until grep -qx 1 "$gpio_lines/sim_gpio0/value" || fail "the line that gpioset drives stays low"
   local level
   for level in up down up; do
     pull 3 $level
