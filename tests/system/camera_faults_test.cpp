@@ -136,7 +136,7 @@ INSTANTIATE_TEST_SUITE_P(
                       CameraFault{"one stamp 0.5 s back", {"stamp 100-100 -0.5"}, 100, 100, false, 1},
                       CameraFault{"stamps 10 s back for 1 s", {"stamp 100-129 -10"}, 100, 129, false, 30},
                       CameraFault{"stamps 1 h ahead for 1 s", {"stamp 100-129 3600"}, 100, 129, false, 30}),
-    [](const ::testing::TestParamInfo<CameraFault>& info) { return std::to_string(info.index); });
+    [](const ::testing::TestParamInfo<CameraFault>& fault) { return std::to_string(fault.index); });
 
 }  // namespace
 }  // namespace posed
