@@ -51,13 +51,13 @@ Trajectory curve(int poses, double scale) {
 TEST(Posectl, HelpNamesSubcommandsAndExitCodes) {
   const Outcome outcome = posectl({"--help"});
   EXPECT_EQ(outcome.exit_code, kExitOk);
-  for (const char* text : {"replay", "eval", "watch", "synth", "record", "model", "check-config", "version", "Exit codes", "78"}) {
+  for (const char* text : {"replay", "eval", "watch", "synth", "record", "devices", "model", "check-config", "version", "Exit codes", "78"}) {
     EXPECT_THAT(outcome.out, HasSubstr(text));
   }
 }
 
 TEST(Posectl, EverySubcommandHasHelp) {
-  for (const char* command : {"replay", "eval", "watch", "synth", "record", "model", "check-config", "version"}) {
+  for (const char* command : {"replay", "eval", "watch", "synth", "record", "devices", "model", "check-config", "version"}) {
     EXPECT_EQ(posectl({command, "--help"}).exit_code, kExitOk) << command;
   }
 }
@@ -81,6 +81,7 @@ TEST(Posectl, AWrongCommandLineIsAUsageError) {
            {"record", "x", "--duration", "-1"},
            {"record", "x", "--jpeg-quality", "50"},
            {"record", "x", "--min-free", "much"},
+           {"devices", "--config", "--json"},
            {"synth"},
            {"synth", "--out", "x", "--frames", "3", "--duration", "3"},
            {"synth", "--out", "x", "--size", "big"},
