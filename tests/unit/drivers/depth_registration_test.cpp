@@ -1,5 +1,6 @@
 #include "drivers/depth_registration.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -216,9 +217,9 @@ TEST_F(Registration, MagnificationLeavesNoHoles) {
   for (const double scale : {1.0, 1.3, 1.7, 2.0, 2.9}) {
     for (const bool slanted : {false, true}) {
       const CameraIntrinsics color = camera(static_cast<int>(60 * scale), static_cast<int>(40 * scale), scale * 60);
-      set(camera(90, 70, 60), color, turned(0.05, 0.01, 0, 0.02));
-      // 60 degrees to the line of sight.
-      paint([&](int x, int) { return slanted ? 2.0 / (1.0 - 1.7 * (x - 45) / 60.0 * 0.5) : 2.0; });
+      // On the slanted wall neighbours lie a fifth further apart in the colour image than where it faces the camera.
+      set(camera(150, 70, 60), color, turned(slanted ? -0.6 : 0.05, 0.01, 0, 0.005));
+      paint([&](int x, int) { return slanted ? 2.0 / (1.0 - 0.6 * (x - 75) / 60.0) : 2.0; });
       apply();
       EXPECT_EQ(holes_within(2), 0U) << "scale " << scale << ", slanted " << slanted;
     }
@@ -244,15 +245,28 @@ TEST_F(Registration, SurvivesWhatIsBehindTheCameraOrFarOutside) {
                        Se3(exp_so3({0, 1.5, 0}), {0.01, 0, 0}), Se3(exp_so3({3.1, 0, 0}), {0, 0, 0})}) {
     set(camera(70, 50, 60), color, T);
     for (std::size_t i = 0; i < raw_.size(); ++i) {
-      raw_[i] = static_cast<std::uint16_t>(i % 3 == 0 ? 65535 : i % 3 == 1 ? 1 : 900);
+      raw_[i] = std::array<std::uint16_t, 4>{65535, 1, 900, 1005}[i % 4];
     }
     apply();
     for (int y = 0; y < 50; ++y) {
       for (int x = 0; x < 70; ++x) {
-        ASSERT_TRUE(std::isfinite(at(x, y)));
+        ASSERT_TRUE(std::isfinite(at(x, y)) && (at(x, y) == 0.0F || at(x, y) > 0.01F)) << at(x, y);
       }
     }
   }
+}
+
+TEST_F(Registration, WhatTouchesTheColourCameraIsLeftOut) {
+  CameraIntrinsics same = camera(70, 50, 60);
+  same.cx = 35;
+  same.cy = 25;
+  set(same, same, Se3(Eigen::Quaterniond::Identity(), {0, 0, -1.0}));
+  paint([](int x, int y) { return x == 35 && y == 25 ? 1.02 : 0.0; });
+  apply();
+  EXPECT_NEAR(at(35, 25), 0.02, 1e-5);
+  paint([](int x, int y) { return x == 35 && y == 25 ? 1.005 : 0.0; });
+  apply();
+  EXPECT_EQ(at(35, 25), 0.0F);
 }
 
 TEST_F(Registration, NothingComesFromNothing) {

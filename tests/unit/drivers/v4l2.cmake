@@ -9,6 +9,6 @@ if(POSED_V4L2)
   posed_test(test_v4l2
     SOURCES "${CMAKE_CURRENT_LIST_DIR}/v4l2_controls_test.cpp" "${CMAKE_CURRENT_LIST_DIR}/v4l2_faults_test.cpp"
             "${CMAKE_CURRENT_LIST_DIR}/v4l2_formats_test.cpp" "${CMAKE_CURRENT_LIST_DIR}/v4l2_listing_test.cpp"
-            "${CMAKE_CURRENT_LIST_DIR}/v4l2_soak_test.cpp"
+            "${CMAKE_CURRENT_LIST_DIR}/v4l2_soak_test.cpp" "${CMAKE_CURRENT_LIST_DIR}/v4l2_stamps_test.cpp"
     LIBRARIES fake_v4l2 posed_drivers PkgConfig::TURBOJPEG fmt::fmt)
 endif()

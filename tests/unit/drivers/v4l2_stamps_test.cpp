@@ -1,0 +1,49 @@
+#include "drivers/v4l2/v4l2_stamps.h"
+
+#include <gtest/gtest.h>
+
+namespace posed {
+namespace {
+
+v4l2_buffer stamped(TimeNs stamp_ns, std::uint32_t flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC) {
+  v4l2_buffer buffer{};
+  buffer.flags = flags;
+  buffer.timestamp.tv_sec = stamp_ns / kNsPerSecond;
+  buffer.timestamp.tv_usec = stamp_ns % kNsPerSecond / kNsPerUs;
+  return buffer;
+}
+
+constexpr TimeNs kSecond = kNsPerSecond;
+
+TEST(V4l2Stamps, TheSameStampTwiceIsBad) {
+  V4l2Stamps stamps;
+  EXPECT_EQ(stamps.time_of(stamped(5 * kSecond), 6 * kSecond).value(), 5 * kSecond);
+  const Result<TimeNs> again = stamps.time_of(stamped(5 * kSecond), 6 * kSecond + 1);
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::BadData);
+  EXPECT_EQ(stamps.time_of(stamped(5 * kSecond + kNsPerMs), 7 * kSecond).value(), 5 * kSecond + kNsPerMs);
+  EXPECT_EQ(stamps.resets(), 0U);
+  EXPECT_EQ(stamps.error_ns(), 0);
+}
+
+TEST(V4l2Stamps, OldOnesAreTrueAndFutureOnesAreNot) {
+  V4l2Stamps stamps;
+  EXPECT_EQ(stamps.time_of(stamped(5 * kSecond), 60 * kSecond).value(), 5 * kSecond);
+  EXPECT_EQ(stamps.time_of(stamped(61 * kSecond + 4 * kNsPerMs), 61 * kSecond).value(), 61 * kSecond + 4 * kNsPerMs);
+  EXPECT_EQ(stamps.time_of(stamped(63 * kSecond), 62 * kSecond).value(), 62 * kSecond) << "on its own clock from now on";
+  EXPECT_EQ(stamps.time_of(stamped(64 * kSecond), 63 * kSecond + kNsPerMs).value(), 63 * kSecond);
+  EXPECT_EQ(stamps.resets(), 1U);
+  stamps.restart();
+  EXPECT_EQ(stamps.time_of(stamped(64 * kSecond), 65 * kSecond).value(), 64 * kSecond) << "believed again";
+}
+
+TEST(V4l2Stamps, WithoutAStampTheTimeOfArrivalCounts) {
+  V4l2Stamps stamps;
+  for (const TimeNs arrival_ns : {5 * kSecond, 6 * kSecond}) {
+    EXPECT_EQ(stamps.time_of(stamped(0, V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN), arrival_ns).value(), arrival_ns);
+  }
+  EXPECT_EQ(stamps.resets(), 0U);
+}
+
+}  // namespace
+}  // namespace posed
