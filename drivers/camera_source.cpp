@@ -88,6 +88,7 @@ class CameraSource final : public RgbdSource {
     open_ = true;
     last_frame_ns_ = clock_.now_ns();
     device_sequence_.reset();
+    guard_.forget_image();
     return std::nullopt;
   }
 

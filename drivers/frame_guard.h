@@ -23,6 +23,12 @@ class FrameGuard {
   /// A frame that was handed on: the next are compared with it.
   void remember(FrameRef frame) { last_ = std::move(frame); }
 
+  /// The camera was opened again: what it showed before says nothing of what it shows now. Stamps go on.
+  void forget_image() {
+    last_ = FrameRef();
+    repeats_ = 0;
+  }
+
  private:
   FrameRef last_;
   std::optional<TimeNs> last_capture_ns_;  // of the last good frame

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/frame_pool.h"
+#include "drivers/frame_guard.h"
 #include "tests/support/stepping_clock.h"
 
 namespace posed {
@@ -27,6 +28,7 @@ struct FakeDevice {
   std::deque<CameraRead> faults;  // what the next reads give instead of frames
   std::uint64_t sequence = 0;
   TimeNs stamp_offset_ns = 0;
+  bool frozen = false;  // it repeats its image
   int frames_let_go = 0;
 };
 
@@ -71,6 +73,8 @@ class FakeCamera final : public Camera {
       ++device_.sequence;
       return {CameraReadKind::Frame, {}};
     }
+    frame->gray.at(0, 0) = device_.frozen ? 255 : static_cast<std::uint8_t>(device_.sequence % 255);
+    frame->depth_m.at(0, 0) = 1.0F;
     frame->sequence = device_.sequence++;
     frame->capture_ns = clock_.now_ns() - kDelay_ns + device_.stamp_offset_ns;
     return {CameraReadKind::Frame, {}};
@@ -207,6 +211,25 @@ TEST_F(CameraSourceTest, StampsAlwaysIncrease) {
   frame = next();
   ASSERT_EQ(frame.kind, CaptureKind::Frame);
   EXPECT_EQ(frame.frame->stamp_utc_ns, utc_ns + 1);
+}
+
+TEST_F(CameraSourceTest, AFrozenImageIsLeftOutUntilItMovesOrTheCameraIsOpenedAgain) {
+  next_sequence();
+  device_.frozen = true;
+  for (int i = 0; i < 1 + FrameGuard::kRepeatsAllowed; ++i) {
+    next_sequence();
+  }
+  EXPECT_EQ(next().error.message, "the camera repeats one image, 3 times so far");
+  EXPECT_EQ(next().kind, CaptureKind::SkippedFrame);
+  device_.frozen = false;
+  EXPECT_EQ(next().kind, CaptureKind::Frame);
+  device_.frozen = true;
+  for (int i = 0; i < 1 + FrameGuard::kRepeatsAllowed; ++i) {
+    EXPECT_EQ(next().kind, CaptureKind::Frame);
+  }
+  device_.faults = {{CameraReadKind::Gone, {ErrorCode::Io, "gone for a moment"}}};
+  EXPECT_EQ(next().kind, CaptureKind::Interrupted);
+  EXPECT_EQ(next().kind, CaptureKind::Frame);
 }
 
 TEST_F(CameraSourceTest, WithoutASlotTheFrameIsLetGo) {

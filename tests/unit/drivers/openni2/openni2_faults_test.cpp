@@ -151,21 +151,24 @@ TEST_F(OpenNi2FaultsTest, DoesWithoutFrameSyncWhereTheCameraHasNone) {
 }
 
 TEST_F(OpenNi2FaultsTest, LosesFramesAndGoesOnWhereThePoolIsFull) {
-  Running running(openni2_config(), kClock, 1);
+  Running running(openni2_config(), kClock, 2);
   running.open();
   push_pair(1'000'000, 1);
   {
     const Capture held = running.next();
     ASSERT_EQ(held.kind, CaptureKind::Frame);
     push_pair(1'033'333, 2);
+    const Capture also_held = running.next();
+    ASSERT_EQ(also_held.kind, CaptureKind::Frame);
+    push_pair(1'066'666, 3);
     EXPECT_EQ(running.next().kind, CaptureKind::NoFreeSlot);
     EXPECT_TRUE(shows(*held.frame, 1));
   }
-  push_pair(1'066'666, 3);
+  push_pair(1'099'999, 4);
   const Capture capture = running.next();
   ASSERT_EQ(capture.kind, CaptureKind::Frame);
-  EXPECT_TRUE(shows(*capture.frame, 3));
-  EXPECT_EQ(capture.frame->sequence, 2U) << "the frame that was lost is counted";
+  EXPECT_TRUE(shows(*capture.frame, 4));
+  EXPECT_EQ(capture.frame->sequence, 3U) << "the frame that was lost is counted";
 }
 
 TEST_F(OpenNi2FaultsTest, SkipsAnImageOfAnotherSize) {
