@@ -55,22 +55,6 @@ END
   } >case.toml
 }
 
-# write_synthetic_config: the same with the rendered camera, 5 frames a second.
-write_synthetic_config() {
-  {
-    cat
-    cat <<'END'
-
-[source]
-kind = "synthetic"
-
-[source.synthetic]
-people = 0
-rate_hz = 5.0
-END
-  } | write_config
-}
-
 # start_posed: with case.toml, in the background; returns when it runs.
 start_posed() {
   : >posed.log
@@ -119,6 +103,41 @@ load_vivid() {
 set_format() { # DEVICE FOURCC WIDTH HEIGHT
   v4l2-ctl -d "$1" --set-fmt-video="width=$3,height=$4,pixelformat=$2"
 }
+
+readonly color_node=/dev/video0
+readonly depth_node=/dev/video1
+
+# plug_cameras: two, with nodes of their own in one device.
+plug_cameras() { load_vivid n_devs=2 node_types=0x1,0x1; }
+
+# write_v4l2_config FORMAT [NODE]: colour in this format, many squares, and 16 bits of depth, white, which is 2 m. The two cameras run free
+# of each other, so two images of one pair are up to half a period apart. What comes on standard input goes into the table source.v4l2.
+write_v4l2_config() {
+  sed 's/^depth_units_per_metre.*/depth_units_per_metre = 32000.0/' /usr/local/share/posed/cameras/synthetic_vga.toml >camera.toml
+  {
+    printf '[source.v4l2]\ndevice = "%s"\nformat = "%s"\n' "${2:-$color_node}" "$1"
+    cat
+    cat <<END
+
+[source]
+kind = "v4l2"
+
+[source.depth]
+device = "$depth_node"
+format = "y16"
+controls = ["test_pattern=6"]
+
+[source.live]
+rate_hz = 10.0
+max_stamp_difference_s = 0.05
+
+[camera]
+calibration = "camera.toml"
+END
+  } | write_config
+}
+
+readonly squares='controls = ["test_pattern=4"]'
 
 # ---- Lines
 

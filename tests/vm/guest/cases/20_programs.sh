@@ -1,5 +1,5 @@
 # shellcheck shell=bash disable=SC2154  # variables of lib.sh
-# posed and posectl on this system, without devices.
+# posed and posectl on this system, and posed as a service.
 
 # posed and posectl start with the libraries that the packages bring.
 case_programs_start() {
@@ -8,22 +8,25 @@ case_programs_start() {
   posed --check-config --config /usr/local/share/posed/posed.toml
 }
 
-# run_service PROPERTY...: posed with case.toml as systemd's service `posed`; returns when systemd takes it for started.
+# run_service PROPERTY...: posed with case.toml as systemd's service `posed`; returns when systemd takes it for started, and sets `run`.
 run_service() {
+  plug_cameras
   chmod 755 /run/case
-  chmod 644 case.toml
-  systemd-run --quiet --unit=posed --service-type=notify --property=TimeoutStartSec=60 "$@" /usr/local/bin/posed --config /run/case/case.toml
+  chmod 644 ./*.toml
+  systemd-run --quiet --unit=posed --service-type=notify --property="TimeoutStartSec=$patience_s" "$@" \
+    /usr/local/bin/posed --config /run/case/case.toml
+  run=$(show_service InvocationID)
 }
 
 show_service() { systemctl show posed --property="$1" --value; }
 
 # show_journal: what this run of it has logged, to the case's log and to the file `journal`.
-show_journal() { journalctl --output=cat --no-pager "_SYSTEMD_INVOCATION_ID=$(show_service InvocationID)" | tee journal; }
+show_journal() { journalctl --output=cat --no-pager "_SYSTEMD_INVOCATION_ID=$run" | tee journal; }
 
 # As a service of Type=notify posed becomes ready, says what it does, publishes poses, and ends on request without an error.
 case_service_becomes_ready() {
-  write_synthetic_config </dev/null
-  run_service || fail "systemd does not see it become ready: $(show_journal | tail -n 1)"
+  write_v4l2_config yuyv <<<"$squares"
+  run_service || fail "systemd does not see it become ready"
   [ "$(show_service ActiveState)" = active ] || fail "it is $(show_service ActiveState)"
   [ -n "$(show_service StatusText)" ] || fail "it says nothing of its status"
   expect_poses 5
@@ -35,7 +38,7 @@ case_service_becomes_ready() {
 
 # A configuration that cannot be used ends the service with status 78 (EX_CONFIG) before it is ready.
 case_service_refuses_configuration() {
-  echo 'no_such_key = 1' | write_synthetic_config
+  { echo 'no_such_key = 1'; echo '[source]'; } | write_config
   ! run_service --property=RemainAfterExit=no 2>/dev/null || fail "it became ready"
   [ "$(show_service ExecMainStatus)" = 78 ] || fail "its exit status is $(show_service ExecMainStatus)"
 }
@@ -45,16 +48,16 @@ policy_of_thread() { ps -L -o comm=,cls= -p "$(show_service MainPID)" | awk -v n
 
 # As a user of its own with the right to it, posed runs its capture thread under SCHED_FIFO.
 case_service_real_time() {
-  printf '[pipeline.capture]\npolicy = "fifo"\npriority = 20\n' | write_synthetic_config
-  run_service --property=DynamicUser=yes --property=LimitRTPRIO=40
+  write_v4l2_config yuyv <<<"$squares"$'\n[pipeline.capture]\npolicy = "fifo"\npriority = 20'
+  run_service --property=DynamicUser=yes --property=SupplementaryGroups=video --property=LimitRTPRIO=40
   show_journal
   [ "$(policy_of_thread capture)" = FF ] || fail "the capture thread has the policy '$(policy_of_thread capture)'"
 }
 
 # Without that right posed warns and runs on.
 case_service_real_time_refused() {
-  printf '[pipeline.capture]\npolicy = "fifo"\npriority = 20\n' | write_synthetic_config
-  run_service --property=DynamicUser=yes --property=LimitRTPRIO=0
+  write_v4l2_config yuyv <<<"$squares"$'\n[pipeline.capture]\npolicy = "fifo"\npriority = 20'
+  run_service --property=DynamicUser=yes --property=SupplementaryGroups=video --property=LimitRTPRIO=0
   expect_poses 3
   show_journal
   [ "$(policy_of_thread capture)" = TS ] || fail "the capture thread has the policy '$(policy_of_thread capture)'"

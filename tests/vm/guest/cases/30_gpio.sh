@@ -3,7 +3,10 @@
 
 # write_gpio_config: lines 0 (status) and 3 (enable) of the chip labelled `robot`, with blinking that is soon seen.
 write_gpio_config() {
-  write_synthetic_config <<'END'
+  plug_cameras
+  write_v4l2_config yuyv <<END
+$squares
+
 [gpio]
 chip = "robot"
 status_line = 0

@@ -1,39 +1,6 @@
 # shellcheck shell=bash disable=SC2154  # variables of lib.sh
-# V4L2 cameras through posed: colour from one simulated camera, depth from another. Both belong to one device, so they are plugged together.
-
-readonly color_node=/dev/video0
-readonly depth_node=/dev/video1
-
-plug_cameras() { load_vivid n_devs=2 node_types=0x1,0x1; }
-
-# write_v4l2_config FORMAT [NODE]: colour in this format, many squares, and 16 bits of depth, white, which is 2 m. The two cameras run free
-# of each other, so two images of one pair are up to half a period apart. What comes on standard input goes into the table source.v4l2.
-write_v4l2_config() {
-  sed 's/^depth_units_per_metre.*/depth_units_per_metre = 32000.0/' /usr/local/share/posed/cameras/synthetic_vga.toml >camera.toml
-  {
-    printf '[source.v4l2]\ndevice = "%s"\nformat = "%s"\n' "${2:-$color_node}" "$1"
-    cat
-    cat <<END
-
-[source]
-kind = "v4l2"
-
-[source.depth]
-device = "$depth_node"
-format = "y16"
-controls = ["test_pattern=6"]
-
-[source.live]
-rate_hz = 10.0
-max_stamp_difference_s = 0.05
-
-[camera]
-calibration = "camera.toml"
-END
-  } | write_config
-}
-
-readonly squares='controls = ["test_pattern=4"]'
+# V4L2 cameras through posed: colour from one simulated camera, depth from another. Both belong to one device, so they are plugged
+# together.
 
 # start_streaming: posed, with frames that come.
 start_streaming() {
@@ -306,4 +273,77 @@ case_v4l2_colors() {
       awk "BEGIN { exit !($decibel > 30) }" || fail "$format differs from rgb24: PSNR $decibel dB"
     done
   done
+}
+
+# plug_loopback FOURCC: /dev/video10 delivers 640x480 images of this format, some ten a second, from standard input (see --stream-from-hdr).
+plug_loopback() {
+  modprobe v4l2loopback video_nr=10 card_label=loopback exclusive_caps=1
+  udevadm settle
+  v4l2-ctl -d /dev/video10 --set-fmt-video-out="width=640,height=480,pixelformat=$1" --stream-out-mmap=4 --stream-from-hdr=- >producer.log 2>&1 &
+}
+
+# as_frame FILE: with the header that v4l2-ctl reads: four letters, and the length, its high byte first.
+as_frame() {
+  local length
+  length=$(printf '%08x' "$(stat --format=%s "$1")")
+  printf '%b' "rdhV\\x${length:0:2}\\x${length:2:2}\\x${length:4:2}\\x${length:6:2}"
+  cat "$1"
+}
+
+# frames FILE...: for ever, one after the other.
+frames() {
+  local file
+  while :; do
+    for file in "$@"; do
+      as_frame "$file"
+      sleep 0.1
+    done
+  done
+}
+
+# JPEG images, whose length is another each time, are decoded: as `mjpeg` and as what `auto` finds.
+case_v4l2_jpeg() {
+  plug_cameras
+  set_format "$color_node" RGB3 640 480
+  v4l2-ctl -d "$color_node" -c test_pattern=4 --stream-mmap=4 --stream-count=1 --stream-to=raw
+  local quality format
+  for quality in 50 70 90; do
+    { printf 'P6\n640 480\n255\n'; cat raw; } | cjpeg -quality $quality -outfile $quality.jpg
+  done
+  plug_loopback MJPG < <(frames 50.jpg 70.jpg 90.jpg)
+  for format in mjpeg auto; do
+    write_v4l2_config $format /dev/video10 </dev/null
+    start_posed
+    expect_poses 5
+    expect_log 'state: tracking'
+    end_posed
+  done
+}
+
+# JPEG images that end too early or are none are left out and told; the others make poses.
+case_v4l2_jpeg_damaged() {
+  plug_cameras
+  set_format "$color_node" RGB3 640 480
+  v4l2-ctl -d "$color_node" -c test_pattern=4 --stream-mmap=4 --stream-count=1 --stream-to=raw
+  { printf 'P6\n640 480\n255\n'; cat raw; } | cjpeg -quality 70 -outfile whole.jpg
+  head -c 5000 whole.jpg >torn.jpg
+  head -c 5000 /dev/urandom >noise.jpg
+  plug_loopback MJPG < <(frames whole.jpg torn.jpg whole.jpg noise.jpg)
+  write_v4l2_config mjpeg /dev/video10 </dev/null
+  start_posed
+  expect_log 'source: /dev/video10: '
+  expect_poses 5
+  end_posed
+}
+
+# A depth camera that delivers colours is refused, with the format that it offers.
+case_v4l2_depth_of_wrong_format() {
+  plug_cameras
+  head -c $((640 * 480 * 4)) /dev/zero >zero
+  plug_loopback BGR4 < <(frames zero)
+  write_v4l2_config yuyv <<<"$squares"
+  sed -i "s#$depth_node#/dev/video10#; s#^format = \"y16\"#format = \"z16\"#" case.toml
+  start_posed
+  expect_log 'source: /dev/video10: .*z16.*BGR4'
+  end_posed
 }

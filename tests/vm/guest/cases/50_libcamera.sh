@@ -28,7 +28,7 @@ END
   } | write_config
 }
 
-plug_cameras() {
+plug_both() {
   load_vivid n_devs=1 node_types=0x1
   modprobe vimc
   udevadm settle
@@ -36,7 +36,7 @@ plug_cameras() {
 
 # Frames of libcamera's camera and a V4L2 depth camera, whose depth is registered to colour.
 case_libcamera_streams() {
-  plug_cameras
+  plug_both
   write_libcamera_config </dev/null
   start_posed
   expect_poses 5
@@ -45,7 +45,7 @@ case_libcamera_streams() {
 
 # A camera that is named, and one that is not there: told by name, and waited for.
 case_libcamera_named() {
-  plug_cameras
+  plug_both
   printf '[source.libcamera]\ncamera = "platform/vimc.0 Sensor B"\n' | write_libcamera_config
   start_posed
   expect_poses 3
@@ -58,7 +58,7 @@ case_libcamera_named() {
 
 # A size that the camera does not have is refused, with the one that it has.
 case_libcamera_size_refused() {
-  plug_cameras
+  plug_both
   write_libcamera_config </dev/null
   sed -i 's/^width.*/width = 640/' camera.toml
   start_posed
@@ -81,7 +81,7 @@ case_libcamera_plugged_late() {
 
 # The depth camera goes away while libcamera's camera streams, and comes back.
 case_libcamera_depth_unplugged() {
-  plug_cameras
+  plug_both
   write_libcamera_config </dev/null
   start_posed
   expect_poses 3
