@@ -48,6 +48,7 @@ posed_test_packages=(
   "librapidcheck-dev|property tests"
   "libbenchmark-dev|benchmarks"
   "libceres-dev|reference solver in tests and benchmarks"
+  "libopencv-calib3d-dev|posectl calibrate"
   "libopencv-imgproc-dev|reference image operations in tests"
   "libopencv-features2d-dev|reference ORB in tests and benchmarks"
   "libopencv-imgcodecs-dev|reference image files in tests"

@@ -22,6 +22,7 @@ void add_watch_command(CLI::App& parent, const Console& console, int& exit_code)
 void add_synth_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_record_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_devices_command(CLI::App& parent, const Console& console, int& exit_code);
+void add_calibrate_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_detect_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_model_command(CLI::App& parent, const Console& console, int& exit_code);
 void add_check_config_command(CLI::App& parent, const Console& console, int& exit_code);

@@ -28,6 +28,7 @@ int parse_and_run(std::vector<std::string> arguments, const Console& console) {
   add_synth_command(app, console, exit_code);
   add_record_command(app, console, exit_code);
   add_devices_command(app, console, exit_code);
+  add_calibrate_command(app, console, exit_code);
   add_detect_command(app, console, exit_code);
   add_model_command(app, console, exit_code);
   add_check_config_command(app, console, exit_code);

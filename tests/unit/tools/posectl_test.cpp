@@ -51,7 +51,7 @@ Trajectory curve(int poses, double scale) {
 TEST(Posectl, HelpNamesSubcommandsAndExitCodes) {
   const Outcome outcome = posectl({"--help"});
   EXPECT_EQ(outcome.exit_code, kExitOk);
-  for (const char* text : {"replay", "eval", "watch", "synth", "record", "devices", "model", "check-config", "version", "Exit codes", "78"}) {
+  for (const char* text : {"replay", "eval", "watch", "synth", "record", "devices", "calibrate", "model", "check-config", "version", "Exit codes", "78"}) {
     EXPECT_THAT(outcome.out, HasSubstr(text));
   }
 }
