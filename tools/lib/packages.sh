@@ -36,6 +36,7 @@ posed_demo_packages=(
 posed_package_packages=(
   "dpkg-dev|libraries that a Debian package depends on"
   "lintian|checks of Debian packages"
+  "libopencv-calib3d-dev|posectl calibrate, which the packages have"
 )
 
 posed_fuzz_packages=(
@@ -48,7 +49,6 @@ posed_test_packages=(
   "librapidcheck-dev|property tests"
   "libbenchmark-dev|benchmarks"
   "libceres-dev|reference solver in tests and benchmarks"
-  "libopencv-calib3d-dev|posectl calibrate"
   "libopencv-imgproc-dev|reference image operations in tests"
   "libopencv-features2d-dev|reference ORB in tests and benchmarks"
   "libopencv-imgcodecs-dev|reference image files in tests"
