@@ -303,17 +303,20 @@ std::string describe(const HealthReport& health, double rate_hz) {
       health.frames_missed + health.frames_skipped + health.frames_no_slot + health.frames_dropped;
   std::string line = fmt::format(
       "{}{}{}, {:.1f} frames/s; frames tracked {}, lost {}, not processed {}; poses published {}, dropped {}, errors {}; track p50 "
-      "{:.1f} ms p99 "
-      "{:.1f} ms; capture to publish p50 {:.1f} ms p99 {:.1f} ms; map {} keyframes, {} landmarks",
+      "{:.1f} ms p99 {:.1f} ms; capture to publish p50 {:.1f} ms p99 {:.1f} ms; map {} keyframes, {} landmarks; page faults "
+      "capture {}, tracker {}",
       to_string(health.state), health.paused ? ", paused" : "",
       health.source_failed      ? ", source failed"
       : health.source.connected ? ""
                                 : ", waiting for the camera",
       rate_hz, health.frames_tracked, health.frames_lost, lost_before_tracker, health.poses_published, health.poses_dropped,
       health.publish_errors, health.track.p50_ms, health.track.p99_ms, health.latency.p50_ms, health.latency.p99_ms,
-      health.map_keyframes, health.map_landmarks);
+      health.map_keyframes, health.map_landmarks, health.capture_page_faults, health.tracker_page_faults);
   if (health.source.reconnects + health.source.stalls > 0) {
     line += fmt::format("; camera back {} times, silent {} times", health.source.reconnects, health.source.stalls);
+  }
+  if (health.source.clock_resets > 0) {
+    line += fmt::format("; its clock began anew {} times", health.source.clock_resets);
   }
   if (health.frames_paused > 0) {
     line += fmt::format("; frames let go while paused {}", health.frames_paused);

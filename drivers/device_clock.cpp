@@ -2,13 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
+#include <limits>
 
 namespace posed {
 
 namespace {
 
 constexpr std::size_t kBinsForSkew = 8;  // a slope over less time is noise
+
+constexpr TimeNs kFarthest_ns = std::numeric_limits<TimeNs>::max() / 4;  // sums of a few of them do not overflow
+
+/// a - b as of counters that wrap around.
+TimeNs difference(TimeNs a, TimeNs b) {
+  return static_cast<TimeNs>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+}
 
 std::int64_t bin_of(TimeNs device_ns) {
   return device_ns / DeviceClock::kBin_ns;
@@ -17,17 +26,26 @@ std::int64_t bin_of(TimeNs device_ns) {
 }  // namespace
 
 TimeNs DeviceClock::to_monotonic(TimeNs device_ns, TimeNs arrival_ns) {
-  const Sample sample{device_ns, arrival_ns - device_ns};
-  if (size_ > 0) {
-    const TimeNs late_ns = sample.offset_ns - offset_at(device_ns);
-    if (device_ns < last_device_ns_ || late_ns < -kEarliest_ns || late_ns > kLatest_ns) {
-      restart();
-      ++resets_;
-    }
+  if (size_ > 0 && was_set(difference(device_ns, base_ns_), arrival_ns)) {
+    restart();
+    ++resets_;
   }
-  last_device_ns_ = device_ns;
+  if (size_ == 0) {
+    base_ns_ = device_ns;
+  }
+  const TimeNs since_ns = difference(device_ns, base_ns_);
+  const Sample sample{since_ns, arrival_ns - since_ns};
+  last_device_ns_ = since_ns;
   add(sample);
-  return device_ns + std::min(offset_at(device_ns), sample.offset_ns);
+  return since_ns + std::min(offset_at(since_ns), sample.offset_ns);
+}
+
+bool DeviceClock::was_set(TimeNs since_ns, TimeNs arrival_ns) const {
+  if (since_ns < last_device_ns_ || since_ns > kFarthest_ns) {
+    return true;
+  }
+  const TimeNs late_ns = arrival_ns - since_ns - offset_at(since_ns);
+  return late_ns < -kEarliest_ns || late_ns > kLatest_ns;
 }
 
 void DeviceClock::restart() {
@@ -52,8 +70,8 @@ DeviceClock::Quality DeviceClock::quality() const {
   return quality;
 }
 
-TimeNs DeviceClock::offset_at(TimeNs device_ns) const {
-  return offset_ns_ + static_cast<TimeNs>(std::llround(skew_ * static_cast<double>(device_ns - origin_ns_)));
+TimeNs DeviceClock::offset_at(TimeNs since_ns) const {
+  return offset_ns_ + static_cast<TimeNs>(std::llround(skew_ * static_cast<double>(since_ns - origin_ns_)));
 }
 
 void DeviceClock::add(const Sample& sample) {

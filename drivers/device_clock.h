@@ -13,7 +13,7 @@ namespace posed {
 /// arrivals that touches the least delayed ones is estimated (the convex hull's edge below their mean: Moon, Skelly, Towsley 1999,
 /// "Estimation and removal of clock skew from network delay measurements"), over the least delayed arrival of each of the last
 /// kBins periods. A constant least delay cannot be told from the offset, and stays in the stamps.
-/// Thread-bound. Does not allocate.
+/// A counter of 64 bits that wraps around goes on. Thread-bound. Does not allocate.
 class DeviceClock {
  public:
   static constexpr std::size_t kBins = 60;
@@ -38,11 +38,12 @@ class DeviceClock {
 
  private:
   struct Sample {
-    TimeNs device_ns = 0;
+    TimeNs device_ns = 0;  // since base_ns_
     TimeNs offset_ns = 0;  // arrival - device
   };
 
-  TimeNs offset_at(TimeNs device_ns) const;
+  bool was_set(TimeNs since_ns, TimeNs arrival_ns) const;
+  TimeNs offset_at(TimeNs since_ns) const;
   void add(const Sample& sample);
   void fit();
 
@@ -50,9 +51,10 @@ class DeviceClock {
   std::size_t first_ = 0;
   std::size_t size_ = 0;
   std::int64_t newest_bin_ = 0;
+  TimeNs base_ns_ = 0;  // the device's stamp at the start: what follows counts from it, so that no stamp is too large
   TimeNs last_device_ns_ = 0;
 
-  TimeNs origin_ns_ = 0;  // device time at which the line has offset_ns_
+  TimeNs origin_ns_ = 0;  // since base_ns_: where the line has offset_ns_
   TimeNs offset_ns_ = 0;
   double skew_ = 0;  // d offset / d device time
   std::uint64_t resets_ = 0;

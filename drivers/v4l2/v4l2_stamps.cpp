@@ -1,5 +1,7 @@
 #include "drivers/v4l2/v4l2_stamps.h"
 
+#include <cstdint>
+
 #include <fmt/format.h>
 
 namespace posed {
@@ -8,8 +10,10 @@ namespace {
 
 constexpr TimeNs kAhead_ns = 5 * kNsPerMs;  // a monotonic stamp may be, by the ways in which drivers compute them
 
+/// Of any bits that a driver gives: what is too large wraps around.
 TimeNs stamp_of(const v4l2_buffer& buffer) {
-  return static_cast<TimeNs>(buffer.timestamp.tv_sec) * kNsPerSecond + static_cast<TimeNs>(buffer.timestamp.tv_usec) * kNsPerUs;
+  return static_cast<TimeNs>(static_cast<std::uint64_t>(buffer.timestamp.tv_sec) * static_cast<std::uint64_t>(kNsPerSecond) +
+                             static_cast<std::uint64_t>(buffer.timestamp.tv_usec) * static_cast<std::uint64_t>(kNsPerUs));
 }
 
 }  // namespace
@@ -23,7 +27,8 @@ void V4l2Stamps::restart() {
 Result<TimeNs> V4l2Stamps::time_of(const v4l2_buffer& buffer, TimeNs arrival_ns) {
   const TimeNs stamp_ns = stamp_of(buffer);
   const bool said_monotonic = (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-  if (!on_device_clock_ && (!said_monotonic || stamp_ns > arrival_ns + kAhead_ns || (any_ && stamp_ns < last_ns_))) {
+  if (!on_device_clock_ &&
+      (!said_monotonic || stamp_ns < 0 || stamp_ns > arrival_ns + kAhead_ns || (any_ && stamp_ns < last_ns_))) {
     on_device_clock_ = true;
     broken_promises_ += said_monotonic ? 1 : 0;
   }

@@ -11,8 +11,8 @@
 namespace posed {
 
 /// Monotonic times of a stream's images. Stamps that the driver flags as monotonic are used as they are, until one shows that they
-/// are not: one that goes back or lies in the future. Those, and stamps of any other clock, go through DeviceClock. A driver that
-/// stamps nothing gets the time of arrival. Thread-bound. Does not allocate but for errors.
+/// are not: one that goes back, lies in the future or is negative. Those, and stamps of any other clock, go through DeviceClock. A
+/// driver that stamps nothing gets the time of arrival. Thread-bound. Does not allocate but for errors.
 class V4l2Stamps {
  public:
   /// The stream begins anew.

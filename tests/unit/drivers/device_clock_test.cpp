@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -97,6 +99,30 @@ TEST(DeviceClock, ALateFrameMovesNothing) {
     EXPECT_NEAR(static_cast<double>(clock.to_monotonic(true_ns, true_ns + late_ns)), static_cast<double>(true_ns), 2.0) << i;
   }
   EXPECT_EQ(clock.quality().resets, 0U);
+}
+
+TEST(DeviceClock, GoesOnWhereTheDevicesCounterWrapsAround) {
+  DeviceClock clock;
+  constexpr TimeNs kLast_ns = std::numeric_limits<TimeNs>::max();
+  EXPECT_EQ(clock.to_monotonic(kLast_ns - 10, 1000), 1000);
+  EXPECT_EQ(clock.to_monotonic(std::numeric_limits<TimeNs>::min() + 9, 1020), 1020);
+  EXPECT_EQ(clock.quality().resets, 0U);
+}
+
+TEST(DeviceClock, BeginsAnewAfterAnyLeap) {
+  constexpr TimeNs kFirst_ns = std::numeric_limits<TimeNs>::min();
+  constexpr TimeNs kLast_ns = std::numeric_limits<TimeNs>::max();
+  for (const TimeNs from_ns : {kFirst_ns, kFirst_ns / 2, TimeNs{0}, kLast_ns / 2, kLast_ns}) {
+    for (const TimeNs to_ns : {kFirst_ns, kFirst_ns / 2, TimeNs{0}, kLast_ns / 2, kLast_ns}) {
+      if (static_cast<std::uint64_t>(to_ns) - static_cast<std::uint64_t>(from_ns) + 2 <= 4) {
+        continue;  // a step, by the counter's wrap
+      }
+      DeviceClock clock;
+      clock.to_monotonic(from_ns, kNsPerSecond);
+      EXPECT_EQ(clock.to_monotonic(to_ns, 2 * kNsPerSecond), 2 * kNsPerSecond) << from_ns << " to " << to_ns;
+      EXPECT_EQ(clock.quality().resets, 1U) << from_ns << " to " << to_ns;
+    }
+  }
 }
 
 TEST(DeviceClock, ForgetsWhatItKnewAtARestart) {

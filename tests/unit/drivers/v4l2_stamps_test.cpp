@@ -1,5 +1,8 @@
 #include "drivers/v4l2/v4l2_stamps.h"
 
+#include <cstdint>
+#include <limits>
+
 #include <gtest/gtest.h>
 
 namespace posed {
@@ -35,6 +38,19 @@ TEST(V4l2Stamps, OldOnesAreTrueAndFutureOnesAreNot) {
   EXPECT_EQ(stamps.resets(), 1U);
   stamps.restart();
   EXPECT_EQ(stamps.time_of(stamped(64 * kSecond), 65 * kSecond).value(), 64 * kSecond) << "believed again";
+}
+
+TEST(V4l2Stamps, ThoseFarOutsideOfAnyTimeAreADevicesOwn) {
+  V4l2Stamps stamps;
+  v4l2_buffer buffer = stamped(0);
+  TimeNs arrival_ns = 60 * kSecond;
+  for (const std::int64_t seconds : {std::int64_t{-7'000'000'000'000}, std::int64_t{-9'000'000'000}, std::int64_t{9'000'000'000},
+                                     std::numeric_limits<std::int64_t>::max(), std::int64_t{1}}) {
+    buffer.timestamp.tv_sec = seconds;
+    buffer.timestamp.tv_usec = 1;
+    arrival_ns += kSecond;
+    EXPECT_EQ(stamps.time_of(buffer, arrival_ns).value(), arrival_ns) << seconds;
+  }
 }
 
 TEST(V4l2Stamps, WithoutAStampTheTimeOfArrivalCounts) {

@@ -110,10 +110,17 @@ readonly depth_node=/dev/video1
 # plug_cameras: two, with nodes of their own in one device.
 plug_cameras() { load_vivid n_devs=2 node_types=0x1,0x1; }
 
+unplug_cameras() { echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind; }
+
+plug_cameras_again() {
+  echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
+  udevadm settle
+}
+
 # write_v4l2_config FORMAT [NODE]: colour in this format, many squares, and 16 bits of depth, white, which is 2 m. The two cameras run free
 # of each other, so two images of one pair are up to half a period apart. What comes on standard input goes into the table source.v4l2.
 write_v4l2_config() {
-  sed 's/^depth_units_per_metre.*/depth_units_per_metre = 32000.0/' /usr/local/share/posed/cameras/synthetic_vga.toml >camera.toml
+  sed 's/^depth_units_per_metre.*/depth_units_per_metre = 32000.0/' /usr/share/posed/cameras/synthetic_vga.toml >camera.toml
   {
     printf '[source.v4l2]\ndevice = "%s"\nformat = "%s"\n' "${2:-$color_node}" "$1"
     cat
@@ -180,8 +187,8 @@ unplug_gpio() { echo 0 >"$gpio_folder/live"; }
 clean_up() {
   trap - ERR EXIT
   set +e
-  systemctl kill --signal=KILL posed.service 2>/dev/null
-  systemctl reset-failed posed.service 2>/dev/null
+  systemctl kill --signal=KILL posed.service posed-case.service 2>/dev/null
+  systemctl reset-failed posed.service posed-case.service 2>/dev/null
   local program
   for program in posed posectl v4l2-ctl cam gpioset gpiomon; do
     pkill -KILL -x "$program"
@@ -196,6 +203,7 @@ clean_up() {
     [ ! -d "/sys/module/${module//-/_}" ] || modprobe -r "$module"
   done
   rm -rf /run/case
+  rm -f /var/lib/posed/*
 }
 mkdir -p /run/case
 cd /run/case

@@ -5,7 +5,7 @@
 case_programs_start() {
   posed --version
   posectl version
-  posed --check-config --config /usr/local/share/posed/posed.toml
+  posed --check-config --config /usr/share/posed/posed.toml
 }
 
 # run_service PROPERTY...: posed with case.toml as systemd's service `posed`; returns when systemd takes it for started, and sets `run`.
@@ -13,12 +13,12 @@ run_service() {
   plug_cameras
   chmod 755 /run/case
   chmod 644 ./*.toml
-  systemd-run --quiet --unit=posed --service-type=notify --property="TimeoutStartSec=$patience_s" "$@" \
-    /usr/local/bin/posed --config /run/case/case.toml
+  systemd-run --quiet --unit=posed-case --service-type=notify --property="TimeoutStartSec=$patience_s" "$@" \
+    /usr/bin/posed --config /run/case/case.toml || return # also where the caller has switched off `set -e`
   run=$(show_service InvocationID)
 }
 
-show_service() { systemctl show posed --property="$1" --value; }
+show_service() { systemctl show posed-case --property="$1" --value; }
 
 # show_journal: what this run of it has logged, to the case's log and to the file `journal`.
 show_journal() { journalctl --output=cat --no-pager "_SYSTEMD_INVOCATION_ID=$run" | tee journal; }
@@ -30,10 +30,10 @@ case_service_becomes_ready() {
   [ "$(show_service ActiveState)" = active ] || fail "it is $(show_service ActiveState)"
   [ -n "$(show_service StatusText)" ] || fail "it says nothing of its status"
   expect_poses 5
-  systemctl stop posed
+  systemctl stop posed-case
   show_journal
   grep -q 'stopping: SIGTERM' journal || fail "it was not asked to end"
-  ! systemctl is-failed --quiet posed || fail "its end is taken for a failure"
+  ! systemctl is-failed --quiet posed-case || fail "its end is taken for a failure"
 }
 
 # A configuration that cannot be used ends the service with status 78 (EX_CONFIG) before it is ready.

@@ -10,21 +10,14 @@ start_streaming() {
   expect_poses 3
 }
 
-unplug_cameras() { echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind; }
-
-plug_cameras_again() {
-  echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
-  udevadm settle
-}
-
 expect_loss() {
   expect_log 'source: no frames; waiting for the camera'
   pass_log
 }
 
-# expect_return TIMES: frames come again, and at its end posed tells how often they did.
+# expect_return TIMES: frames come again, and at its end posed tells how often they did. (It says so at once only where they were away for
+# long enough to be missed.)
 expect_return() {
-  expect_log 'source: frames come'
   expect_poses 3
   end_posed
   expect_log "camera back $1 times"
@@ -56,15 +49,12 @@ case_v4l2_unplugged() {
   expect_return 1
 }
 
-# The depth camera alone goes away while it streams: no frames without depth; all is well when the cameras are plugged in again.
+# The depth camera alone goes away while it streams, and comes back as soon as it is let go: no frames without depth until then.
 case_v4l2_depth_unplugged() {
   start_streaming
   pass_log
   v4l2-ctl -d "$depth_node" -c disconnect=1
   expect_log "source: $depth_node"
-  expect_loss
-  unplug_cameras
-  plug_cameras_again
   expect_return 1
 }
 
@@ -158,15 +148,18 @@ case_v4l2_sequence_wraps() {
   [ "$missed" -lt 1000 ] || fail "$missed frames were not processed"
 }
 
-# Stamps of the colour camera that leap by centuries are told, and its images are not paired with depth until they are right again.
+# A colour camera whose stamps are centuries ahead, and after 16 s wrap around to centuries ago: they are known not to be of the clock that
+# the driver claims, and are mapped onto it; poses come before and after.
 case_v4l2_stamps_leap() {
-  start_streaming
-  pass_log
+  plug_cameras
   v4l2-ctl -d "$color_node" -c wrap_timestamp=1
-  expect_log 'source: .'
-  v4l2-ctl -d "$color_node" -c wrap_timestamp=0
+  write_v4l2_config yuyv <<<"$squares"
+  start_posed
+  expect_poses 5
+  sleep 20
   expect_poses 5
   end_posed
+  expect_log 'its clock began anew [1-9]'
 }
 
 # A camera that another program streams from is told to be busy, and taken when it is free.
@@ -218,7 +211,7 @@ case_v4l2_refusals() {
   expect_log 'source: .*mjpeg'
   end_posed
   write_v4l2_config yuyv </dev/null
-  sed -i 's/synthetic_vga/synthetic/' case.toml
+  sed -i 's/^width.*/width = 320/; s/^height.*/height = 240/' camera.toml
   start_posed
   expect_log 'source: .*320x240'
   end_posed
@@ -229,9 +222,9 @@ case_v4l2_as_service() {
   plug_cameras
   write_v4l2_config yuyv </dev/null
   chmod 755 /run/case
-  systemd-run --quiet --unit=posed --service-type=notify --property=DynamicUser=yes --property=SupplementaryGroups=video \
+  systemd-run --quiet --unit=posed-case --service-type=notify --property=DynamicUser=yes --property=SupplementaryGroups=video \
     --property=DevicePolicy=closed --property='DeviceAllow=char-video4linux rw' \
-    /usr/local/bin/posed --config /run/case/case.toml
+    /usr/bin/posed --config /run/case/case.toml
   expect_poses 5
 }
 

@@ -3,7 +3,7 @@
 
 # write_libcamera_config: what libcamera makes of vimc's 640 columns is 636.
 write_libcamera_config() {
-  local calibration=/usr/local/share/posed/cameras/synthetic_vga.toml
+  local calibration=/usr/share/posed/cameras/synthetic_vga.toml
   sed 's/^depth_units_per_metre.*/depth_units_per_metre = 32000.0/' $calibration >depth.toml
   sed 's/^width.*/width = 636/; s/^cx.*/cx = 317.5/' $calibration >camera.toml
   {
@@ -86,10 +86,10 @@ case_libcamera_depth_unplugged() {
   start_posed
   expect_poses 3
   pass_log
-  echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind
+  unplug_cameras
   expect_log 'source: no frames; waiting for the camera'
   pass_log
-  echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
+  plug_cameras_again
   expect_log 'source: frames come'
   expect_poses 3
   end_posed
