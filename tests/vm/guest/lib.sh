@@ -17,7 +17,13 @@ skip() {
   exit 77
 }
 
-trap '[ ! -e posed.log ] || { echo "---- posed.log"; cat posed.log; }' EXIT
+show_logs() {
+  local log
+  for log in *.log; do
+    [ ! -e "$log" ] || { echo "---- $log"; cat "$log"; }
+  done
+}
+trap show_logs EXIT
 
 # No case tells a time: an emulated processor on a busy machine may take so long for what takes a moment elsewhere.
 readonly patience_s=120

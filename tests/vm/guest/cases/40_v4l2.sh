@@ -211,7 +211,7 @@ case_v4l2_refusals() {
   expect_log 'source: .*mjpeg'
   end_posed
   write_v4l2_config yuyv </dev/null
-  sed -i 's/^width.*/width = 320/; s/^height.*/height = 240/' camera.toml
+  sed -i 's/^width.*/width = 320/; s/^height.*/height = 240/; s/^cx.*/cx = 159.5/; s/^cy.*/cy = 119.5/' camera.toml
   start_posed
   expect_log 'source: .*320x240'
   end_posed
@@ -229,7 +229,7 @@ case_v4l2_as_service() {
 }
 
 # record FOLDER FRAMES: with case.toml.
-record() { timeout "$patience_s" posectl record --config case.toml "$1" --frames "$2"; }
+record() { timeout "$patience_s" posectl record --min-free 50MB --config case.toml "$1" --frames "$2"; }
 
 # first_image FOLDER KIND: of a recording, `rgb` or `depth`, as a portable image on standard output.
 first_image() { pngtopnm "$1/$(sed -n '/^#/d; s/^[^ ]* //p' "$1/$2.txt" | head -n 1)"; }
