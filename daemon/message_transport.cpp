@@ -1,5 +1,9 @@
 #include "daemon/message_transport.h"
 
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <unistd.h>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,10 +16,21 @@ namespace {
 std::string how_to_mend(const std::string& url) {
   if (url.starts_with("udpm://")) {
     return "if this machine has no multicast route, give it one: 'ip link set lo multicast on' and 'ip route add 224.0.0.0/4 dev "
-           "lo' (as "
-           "root); otherwise see whether publisher.url is a multicast address and a port, as in udpm://239.255.76.67:7667?ttl=0";
+           "lo' (as root); otherwise see whether publisher.url is a multicast address and a port, as in "
+           "udpm://239.255.76.67:7667?ttl=0";
   }
   return "see whether publisher.url is a URL that LCM knows, as in udpm://239.255.76.67:7667?ttl=0";
+}
+
+/// liblcm (1.3.1) that gets no pipe closes descriptor 0, whatever that is.
+Status check_pipe() {
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) {
+    return make_error(ErrorCode::Unavailable, fmt::format("no pipe for LCM: {}", std::strerror(errno)));
+  }
+  ::close(ends[0]);
+  ::close(ends[1]);
+  return {};
 }
 
 }  // namespace
@@ -25,6 +40,9 @@ LcmTransport::LcmTransport(std::string url) : url_(std::move(url)) {}
 LcmTransport::~LcmTransport() = default;
 
 Status LcmTransport::open() {
+  if (Status possible = check_pipe(); !possible) {
+    return possible;
+  }
   auto opened = std::make_unique<lcm::LCM>(url_);
   if (!opened->good()) {
     return make_error(ErrorCode::Unavailable, fmt::format("LCM cannot start on '{}': {}", url_, how_to_mend(url_)));

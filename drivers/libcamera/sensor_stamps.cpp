@@ -15,14 +15,16 @@ TimeNs SensorStamps::time_of(TimeNs stamp_ns, TimeNs arrival_ns) {
   }
   if (!is_mapped_ && (stamp_ns > arrival_ns + kAhead_ns || stamp_ns < arrival_ns - kBehind_ns)) {
     is_mapped_ = true;
-    ++broken_promises_;
+    leaps_ += any_ ? 1 : 0;
   }
+  any_ = true;
   return is_mapped_ ? clock_.to_monotonic(stamp_ns, arrival_ns) : stamp_ns;
 }
 
 void SensorStamps::restart() {
   clock_.restart();
   is_mapped_ = false;
+  any_ = false;
 }
 
 }  // namespace posed

@@ -15,13 +15,15 @@ class SensorStamps {
   /// The camera was opened again.
   void restart();
 
-  std::uint64_t resets() const { return broken_promises_ + clock_.quality().resets; }
+  /// How often stamps leapt within a stream.
+  std::uint64_t resets() const { return leaps_ + clock_.quality().resets; }
   TimeNs error_ns() const { return is_mapped_ ? clock_.quality().error_ns : 0; }
 
  private:
   DeviceClock clock_;
   bool is_mapped_ = false;
-  std::uint64_t broken_promises_ = 0;
+  bool any_ = false;
+  std::uint64_t leaps_ = 0;  // of stamps that had been true until then
 };
 
 }  // namespace posed

@@ -30,7 +30,7 @@ Result<TimeNs> V4l2Stamps::time_of(const v4l2_buffer& buffer, TimeNs arrival_ns)
   if (!on_device_clock_ &&
       (!said_monotonic || stamp_ns < 0 || stamp_ns > arrival_ns + kAhead_ns || (any_ && stamp_ns < last_ns_))) {
     on_device_clock_ = true;
-    broken_promises_ += said_monotonic ? 1 : 0;
+    leaps_ += any_ ? 1 : 0;
   }
   TimeNs time_ns = stamp_ns;
   if (on_device_clock_) {

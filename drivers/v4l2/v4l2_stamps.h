@@ -21,7 +21,8 @@ class V4l2Stamps {
   /// When the image in `buffer` was taken, always later than the one before; BadData where it is not.
   Result<TimeNs> time_of(const v4l2_buffer& buffer, TimeNs arrival_ns);
 
-  std::uint64_t resets() const { return broken_promises_ + clock_.quality().resets; }
+  /// How often stamps leapt within a stream.
+  std::uint64_t resets() const { return leaps_ + clock_.quality().resets; }
   TimeNs error_ns() const { return on_device_clock_ ? clock_.quality().error_ns : 0; }
 
  private:
@@ -29,7 +30,7 @@ class V4l2Stamps {
   bool on_device_clock_ = false;
   bool any_ = false;
   TimeNs last_ns_ = 0;
-  std::uint64_t broken_promises_ = 0;
+  std::uint64_t leaps_ = 0;  // of stamps that had been true until then
 };
 
 }  // namespace posed

@@ -1,9 +1,11 @@
 #include "daemon/publisher.h"
 
 #include <cstdint>
+#include <fcntl.h>
 #include <memory>
 #include <span>
 #include <string>
+#include <unistd.h>
 #include <vector>
 
 #include <bot_core/pose_t.hpp>
@@ -11,6 +13,7 @@
 #include <lcm/lcm-cpp.hpp>
 #include <posed/pose_t.hpp>
 #include <posed/status_t.hpp>
+#include <sys/resource.h>
 
 #include "tests/unit/daemon/fake_transport.h"
 #include "tests/unit/daemon/fakes.h"
@@ -151,6 +154,23 @@ TEST(LcmTransport, SaysHowToMendAnUnusableUrl) {
   EXPECT_EQ(opened.error().code, ErrorCode::Unavailable);
   EXPECT_NE(opened.error().message.find("nonsense://"), std::string::npos);
   EXPECT_NE(opened.error().message.find("publisher.url"), std::string::npos);
+}
+
+TEST(LcmTransport, WithoutDescriptorsClosesNobodyElses) {
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const int free_one = ::dup(0);
+  ASSERT_GE(free_one, 0) << "the test needs a standard input";
+  ::close(free_one);
+  rlimit none = before;
+  none.rlim_cur = static_cast<rlim_t>(free_one);
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  LcmTransport transport("udpm://239.255.76.67:7667?ttl=0");
+  const Status opened = transport.open();
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  ASSERT_FALSE(opened);
+  EXPECT_NE(opened.error().message.find("pipe"), std::string::npos) << opened.error().message;
+  EXPECT_GE(::fcntl(0, F_GETFD), 0) << "the standard input was closed";
 }
 
 TEST(LcmTransport, DeliversWithinTheProcessOverMemq) {

@@ -128,7 +128,7 @@ TEST_F(V4l2Faults, WhatClaimsToBeMonotonicAndIsNotIsFoundOut) {
   color_->clock_offset_ns = kNsPerSecond;  // in the future
   run_for(5.0);
   EXPECT_GE(stamps_.size(), 148U);
-  EXPECT_EQ(source_->health().clock_resets, 1U);
+  EXPECT_EQ(source_->health().clock_resets, 0U) << "it is not the clock that was set";
 }
 
 TEST_F(V4l2Faults, StampsThatGoBackAndStayThere) {

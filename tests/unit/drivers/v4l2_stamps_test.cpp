@@ -37,6 +37,9 @@ TEST(V4l2Stamps, OldOnesAreTrueAndFutureOnesAreNot) {
   EXPECT_EQ(stamps.time_of(stamped(64 * kSecond), 63 * kSecond + kNsPerMs).value(), 63 * kSecond);
   EXPECT_EQ(stamps.resets(), 1U);
   stamps.restart();
+  EXPECT_EQ(stamps.time_of(stamped(66 * kSecond), 64 * kSecond).value(), 64 * kSecond);
+  EXPECT_EQ(stamps.resets(), 1U) << "a claim that was wrong from the start is no leap";
+  stamps.restart();
   EXPECT_EQ(stamps.time_of(stamped(64 * kSecond), 65 * kSecond).value(), 64 * kSecond) << "believed again";
 }
 

@@ -22,7 +22,14 @@ show_logs() {
   for log in *.log; do
     [ ! -e "$log" ] || { echo "---- $log"; cat "$log"; }
   done
+  echo "---- posed.service"
+  journal_of_service
 }
+
+# journal_of_service: what the installed service and systemd have said of it since the case began.
+case_began=$(date +%s)
+journal_of_service() { journalctl --output=cat --no-pager --quiet --unit=posed.service --since="@$case_began"; }
+
 trap show_logs EXIT
 
 # No case tells a time: an emulated processor on a busy machine may take so long for what takes a moment elsewhere.

@@ -55,15 +55,18 @@ case_gpio_enable_pauses() {
   end_posed
 }
 
-# A chip that is pulled out is told in the log and posed runs on; plugged in again, its lines are worked again.
+# A chip that is pulled out is told in the log and posed runs on; plugged in again, its line is worked again. The line is an output: the
+# simulated chip frees its interrupts while an input still has them, and the kernel breaks.
 case_gpio_chip_removed() {
-  start_with_lines
-  expect_poses 3
+  plug_gpio
+  write_gpio_config
+  sed -i '/^enable_line/d' case.toml
+  start_posed
+  expect_blinking
   unplug_gpio
   expect_log 'gpio: waiting for a line'
   expect_poses 3
   plug_gpio
-  pull 3 up
   expect_log 'gpio: every line is held'
   expect_poses 3
   expect_blinking

@@ -159,7 +159,6 @@ case_v4l2_stamps_leap() {
   sleep 20
   expect_poses 5
   end_posed
-  expect_log 'its clock began anew [1-9]'
 }
 
 # A camera that another program streams from is told to be busy, and taken when it is free.
@@ -272,7 +271,7 @@ case_v4l2_colors() {
 plug_loopback() {
   modprobe v4l2loopback video_nr=10 card_label=loopback exclusive_caps=1
   udevadm settle
-  v4l2-ctl -d /dev/video10 --set-fmt-video-out="width=640,height=480,pixelformat=$1" --stream-out-mmap=4 --stream-from-hdr=- >producer.log 2>&1 &
+  v4l2-ctl -d /dev/video10 --set-fmt-video-out="width=640,height=480,pixelformat=$1" --stream-out-mmap=4 --stream-from-hdr=- <&0 >producer.log 2>&1 &
 }
 
 # as_frame FILE: with the header that v4l2-ctl reads: four letters, and the length, its high byte first.

@@ -6,15 +6,12 @@ is_another() { unit_is active && [ "$(unit_property MainPID)" != "$1" ]; } # tha
 unit_is() { [ "$(unit_property ActiveState)" = "$1" ]; }
 
 # expect_journal PATTERN: the service says so soon, or has said so since the case began.
-expect_journal() { wait_until journal_has "$1" || { journal_of_service; fail "the service does not log '$1'"; }; }
+expect_journal() { wait_until journal_has "$1" || fail "the service does not log '$1'"; }
 journal_has() { journal_of_service | grep -E -- "$1"; }
-journal_of_service() { journalctl --output=cat --no-pager --unit=posed --since="@$case_began"; }
 
 # configure_service: the administrator's configuration: two cameras by V4L2, lines, a map, real time. What comes on standard input goes
 # into the table source.v4l2.
 configure_service() {
-  case_began=$(date +%s)
-  plug_cameras
   write_v4l2_config yuyv
   cat >>case.toml <<'END'
 
@@ -37,15 +34,16 @@ END
 }
 
 start_service() {
+  plug_cameras
   configure_service <<<"$squares"
-  systemctl start posed || { journal_of_service; fail "systemd does not start it"; }
+  systemctl start posed || fail "systemd does not start it"
   unit_is active || fail "it is $(unit_property ActiveState)"
 }
 
 # The package's unit, user, groups, rules and limits are in place, and what it installed has not been changed.
 case_service_installed() {
   systemctl cat posed.service >/dev/null
-  systemd-analyze verify posed.service
+  systemd-analyze verify --man=no posed.service
   id posed | tee /dev/stderr | grep -q video
   id posed | grep -q gpio
   [ -e /etc/posed/posed.toml ] || fail "there is no configuration"
@@ -77,7 +75,6 @@ case_service_runs() {
 # A camera that is not there: the unit is ready nevertheless, says that it waits, and stops within its time.
 case_service_without_camera() {
   configure_service <<<"$squares"
-  modprobe -r vivid
   systemctl start posed || fail "systemd does not take it for started"
   expect_journal 'waiting for the camera'
   unit_is active || fail "it is $(unit_property ActiveState)"
@@ -141,9 +138,10 @@ case_service_unplugged() {
 case_service_lines() {
   plug_gpio
   pull 3 up
+  plug_cameras
   configure_service <<<"$squares"
   printf '\n[gpio]\nchip = "robot"\nstatus_line = 0\nenable_line = 3\n' >>/etc/posed/posed.toml
-  systemctl start posed || { journal_of_service; fail "systemd does not start it"; }
+  systemctl start posed || fail "systemd does not start it"
   expect_poses 3
   gpioinfo "$gpio_chip" | tee /dev/stderr | grep -E 'line +0:' | grep -q posed || fail "the line is not taken"
   systemctl stop posed
