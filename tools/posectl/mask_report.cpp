@@ -1,6 +1,7 @@
 #include "tools/posectl/mask_report.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -41,16 +42,22 @@ int nearest(float coordinate, int size) {
   return std::clamp(static_cast<int>(std::lround(coordinate)), 0, size - 1);
 }
 
-void dot(ImageView<std::uint8_t> bgr, float x, float y) {
+constexpr std::array<std::uint8_t, 3> kKeptBgr{0, 255, 0};
+constexpr std::array<std::uint8_t, 3> kLeftOutBgr{255, 64, 0};
+
+void dot(ImageView<std::uint8_t> bgr, float x, float y, const std::array<std::uint8_t, 3>& color) {
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
       std::uint8_t* const pixel =
           &bgr.at(nearest(x + static_cast<float>(dx), bgr.width), nearest(y + static_cast<float>(dy), bgr.height));
-      pixel[0] = 0;
-      pixel[1] = 255;
-      pixel[2] = 0;
+      std::copy(color.begin(), color.end(), pixel);
     }
   }
+}
+
+bool is_left_out(const TrackedView& view, float x, float y) {
+  const ImageView<float>& depth = view.frame.depth_m;
+  return view.mask != nullptr && view.mask->is_mover(x, y, depth.at(nearest(x, depth.width), nearest(y, depth.height)));
 }
 
 }  // namespace
@@ -92,9 +99,15 @@ Status MaskReport::draw(const TrackedView& view) {
       }
     }
   }
+  extractor_.extract(view.frame.gray, features_);
+  for (const Keypoint& keypoint : features_.keypoints) {
+    if (is_left_out(view, keypoint.x, keypoint.y)) {
+      dot(bgr, keypoint.x, keypoint.y, kLeftOutBgr);
+    }
+  }
   if (view.features != nullptr) {
     for (const Keypoint& keypoint : view.features->keypoints) {
-      dot(bgr, keypoint.x, keypoint.y);
+      dot(bgr, keypoint.x, keypoint.y, kKeptBgr);
     }
   }
   return write_jpeg_bgr(options_.draw / (stamp_name(view.frame.stamp_utc_ns) + ".jpg"), bgr, 85);
@@ -111,20 +124,17 @@ Status MaskReport::compare(const TrackedView& view) {
     return make_error(ErrorCode::BadData, fmt::format("{}: the mask is {} x {}, the frame {} x {}", path.string(), truth.width,
                                                       truth.height, depth.width, depth.height));
   }
-  const auto judged = [&](float x, float y) {
-    return view.mask != nullptr && view.mask->is_mover(x, y, depth.at(nearest(x, depth.width), nearest(y, depth.height)));
-  };
   const auto is_true = [&](float x, float y) { return truth.at(nearest(x, truth.width), nearest(y, truth.height)) != 0; };
   for (int y = 0; y < truth.height; y += kSampling) {
     for (int x = 0; x < truth.width; x += kSampling) {
       const auto u = static_cast<float>(x);
       const auto v = static_cast<float>(y);
-      count(pixels_, judged(u, v), is_true(u, v));
+      count(pixels_, is_left_out(view, u, v), is_true(u, v));
     }
   }
   extractor_.extract(view.frame.gray, features_);
   for (const Keypoint& keypoint : features_.keypoints) {
-    count(found_, judged(keypoint.x, keypoint.y), is_true(keypoint.x, keypoint.y));
+    count(found_, is_left_out(view, keypoint.x, keypoint.y), is_true(keypoint.x, keypoint.y));
   }
   if (view.features != nullptr) {
     for (const Keypoint& keypoint : view.features->keypoints) {

@@ -29,7 +29,7 @@ struct MaskScore {
 class MaskReport {
  public:
   struct Options {
-    std::filesystem::path draw;   ///< folder for pictures: movers tinted, kept features dotted; empty: none
+    std::filesystem::path draw;   ///< folder for pictures: movers tinted, features kept (green) and left out (blue); empty: none
     int draw_every = 15;          ///< frames
     std::filesystem::path truth;  ///< folder of STAMP.png (to 6 or 9 decimals), not 0 where something moves; empty: none
   };

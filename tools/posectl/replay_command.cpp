@@ -263,8 +263,8 @@ void add_replay_command(CLI::App& parent, const Console& console, int& exit_code
                       "Synthetic: write the true pose of every processed frame (TUM format)");
   command->add_option("--detections", options->detections,
                       "Look for people, and write lines `stamp score x_min y_min x_max y_max` [s, pixels]");
-  CLI::Option* draw =
-      command->add_option("--draw", options->masks.draw, "Folder for pictures of frames: movers tinted, kept features dotted");
+  CLI::Option* draw = command->add_option(
+      "--draw", options->masks.draw, "Folder for pictures of frames: movers tinted, features kept (green) and left out (blue)");
   command->add_option("--draw-every", options->masks.draw_every, "Frames from one picture to the next; 15 unless given")
       ->check(CLI::Range(1, 1'000'000))
       ->needs(draw);
