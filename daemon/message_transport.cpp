@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include "core/logging.h"
+
 namespace posed {
 
 namespace {
@@ -47,14 +49,20 @@ Status LcmTransport::open() {
   if (!opened->good()) {
     return make_error(ErrorCode::Unavailable, fmt::format("LCM cannot start on '{}': {}", url_, how_to_mend(url_)));
   }
+  receives_ = !subscriptions_.empty();
   for (const std::unique_ptr<Subscription>& subscription : subscriptions_) {
-    // Not the overload for member functions: gcc 12 with the undefined-behaviour sanitizer compiles its call wrongly.
-    opened->subscribeFunction(
-        subscription->channel,
-        +[](const lcm::ReceiveBuffer* received, const std::string&, Subscription* to) {
-          to->handler({static_cast<const std::uint8_t*>(received->data), received->data_size});
-        },
-        subscription.get());
+    // In C, since liblcm's C++ hides whether it worked; the first one waits up to 10 s for a message from itself to come back.
+    const lcm_msg_handler_t hand_on = [](const lcm_recv_buf_t* received, const char*, void* to) {
+      static_cast<Subscription*>(to)->handler({static_cast<const std::uint8_t*>(received->data), received->data_size});
+    };
+    receives_ = receives_ &&
+                lcm_subscribe(opened->getUnderlyingLCM(), subscription->channel.c_str(), hand_on, subscription.get()) != nullptr;
+  }
+  if (!receives_ && !subscriptions_.empty()) {
+    log_warning(
+        "LCM receives nothing on '{}', not even what it sends itself: see the routing tables and the firewall. Requests to "
+        "this daemon are not answered; what it publishes may not arrive either",
+        url_);
   }
   lcm_ = std::move(opened);
   return {};
@@ -74,7 +82,7 @@ void LcmTransport::subscribe(const std::string& channel, Handler handler) {
 
 void LcmTransport::receive() {
   constexpr int kAtMost = 16;  // so that a flood of requests does not keep poses waiting
-  for (int i = 0; i < kAtMost && !subscriptions_.empty() && lcm_->handleTimeout(0) > 0; ++i) {
+  for (int i = 0; i < kAtMost && receives_ && lcm_->handleTimeout(0) > 0; ++i) {
   }
 }
 

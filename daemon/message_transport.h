@@ -63,6 +63,7 @@ class LcmTransport final : public MessageTransport {
   std::string url_;
   std::vector<std::unique_ptr<Subscription>> subscriptions_;  // liblcm keeps their addresses
   std::unique_ptr<lcm::LCM> lcm_;
+  bool receives_ = false;  // without it, liblcm must not be asked: it aborts
 };
 
 }  // namespace posed

@@ -96,6 +96,14 @@ Status Watcher::open() {
                     "on' and 'ip route add 224.0.0.0/4 dev lo' (as root)",
                     options_.url));
   }
+  // Waits up to 10 s for a message from itself to come back; without one, liblcm aborts at the first subscription.
+  if (lcm_.getFileno() < 0) {
+    return make_error(
+        ErrorCode::Unavailable,
+        fmt::format("LCM receives nothing on '{}', not even what this program sends itself: see the routing tables and "
+                    "the firewall",
+                    options_.url));
+  }
   if (!options_.csv.empty()) {
     if (const Status status = check_writable(options_.csv); !status) {
       return status;

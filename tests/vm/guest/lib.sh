@@ -215,6 +215,8 @@ clean_up() {
   for module in gpio-sim vivid vimc v4l2loopback; do
     [ ! -d "/sys/module/${module//-/_}" ] || modprobe -r "$module"
   done
+  rm -rf /run/systemd/system/posed.service.d
+  systemctl daemon-reload
   umount /run/case/disk 2>/dev/null
   rm -rf /run/case
   rm -f /var/lib/posed/*

@@ -134,6 +134,24 @@ case_service_unplugged() {
   [ "$(unit_property Result)" = success ] || fail "its end is taken for a failure: $(unit_property Result)"
 }
 
+# A firewall that lets nothing in: the daemon cannot be asked for anything, says so, and publishes; `posectl watch` says so, too.
+case_service_firewalled() {
+  plug_cameras
+  configure_service <<<"$squares"
+  mkdir -p /run/systemd/system/posed.service.d
+  printf '[Service]\nIPAddressDeny=any\nIPAddressAllow=multicast\n' >/run/systemd/system/posed.service.d/firewall.conf
+  systemctl daemon-reload
+  systemctl start posed || fail "systemd does not start it"
+  expect_journal 'LCM receives nothing'
+  expect_poses 10
+  [ "$(unit_property NRestarts)" = 0 ] || fail "it was restarted"
+  local status=0
+  systemd-run --quiet --wait --pipe --property=IPAddressDeny=any --property=IPAddressAllow=multicast posectl watch --count 1 2>watch.log || status=$?
+  [ "$status" = 69 ] || fail "posectl watch ends with $status"
+  grep -q 'LCM receives nothing' watch.log || fail "posectl watch does not say why"
+  systemctl stop posed
+}
+
 # GPIO lines work under the unit's confinement.
 case_service_lines() {
   plug_gpio
