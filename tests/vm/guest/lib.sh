@@ -201,6 +201,7 @@ clean_up() {
   trap - ERR EXIT
   set +e
   systemctl kill --signal=KILL posed.service posed-case.service 2>/dev/null
+  systemctl stop posed.service posed-case.service 2>/dev/null # it would be restarted
   systemctl reset-failed posed.service posed-case.service 2>/dev/null
   local program
   for program in posed posectl v4l2-ctl cam gpioset gpiomon; do
