@@ -53,6 +53,7 @@ posed_test_packages=(
   "libopencv-features2d-dev|reference ORB in tests and benchmarks"
   "libopencv-imgcodecs-dev|reference image files in tests"
   "libumockdev-dev|a GPIO chip for tests, below libgpiod"
+  "umockdev|what libumockdev puts below a program"
   "python3|reports and reference computations of tests"
   "python3-numpy|reference computations of tests"
   "python3-torch|tests of the training code"

@@ -6,13 +6,16 @@ import xml.etree.ElementTree as ElementTree
 
 
 def skip_reason(case: ElementTree.Element) -> str:
-    """What the test itself said: GoogleTest prints "FILE:LINE: Skipped", then the message, then "[  SKIPPED ]"."""
+    """What the test itself said: GoogleTest prints "FILE:LINE: Skipped", then the message, then "[  SKIPPED ]", scripts a line."""
     if case.get("status") == "disabled":
         return "disabled"
     output = case.findtext("system-out") or ""
     said = re.search(r": Skipped\n(.*?)\n*\[  SKIPPED \]", output, re.DOTALL)
     if said and said.group(1).strip():
         return " ".join(said.group(1).split())
+    said = re.findall(r"^skipped: (.+)$", output, re.MULTILINE)  # scripts
+    if said:
+        return said[-1]
     skipped = case.find("skipped")
     return (skipped.get("message") if skipped is not None else None) or "no reason given"
 

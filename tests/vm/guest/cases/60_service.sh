@@ -40,6 +40,14 @@ start_service() {
   unit_is active || fail "it is $(unit_property ActiveState)"
 }
 
+# stop_service: systemd takes it for a success; how long it took is in the case's log.
+stop_service() {
+  local -r began_ms=$(date +%s%3N)
+  systemctl stop posed
+  echo "stopped in $(($(date +%s%3N) - began_ms)) ms"
+  [ "$(unit_property Result)" = success ] || fail "its end is taken for a failure: $(unit_property Result)"
+}
+
 # The package's unit, user, groups, rules and limits are in place, and what it installed has not been changed.
 case_service_installed() {
   systemctl cat posed.service >/dev/null
@@ -63,10 +71,7 @@ case_service_runs() {
   ! journal_has 'lock_memory|cannot lock' || fail "memory is not locked"
   echo "memory: now $(unit_property MemoryCurrent), at most $(unit_property MemoryMax) bytes; tasks $(unit_property TasksCurrent)"
   [ "$(unit_property MemoryCurrent)" -lt "$(unit_property MemoryMax)" ] || fail "no ceiling on its memory"
-  local -r began_ms=$(date +%s%3N)
-  systemctl stop posed
-  echo "stopped in $(($(date +%s%3N) - began_ms)) ms"
-  [ "$(unit_property Result)" = success ] || fail "its end is taken for a failure: $(unit_property Result)"
+  stop_service
   expect_journal 'stopping: SIGTERM'
   [ -s /var/lib/posed/map ] || fail "there is no map in /var/lib/posed"
   [ "$(stat -c %U /var/lib/posed/map)" = posed ] || fail "the map is not posed's"
@@ -78,12 +83,11 @@ case_service_without_camera() {
   systemctl start posed || fail "systemd does not take it for started"
   expect_journal 'waiting for the camera'
   unit_is active || fail "it is $(unit_property ActiveState)"
-  systemctl stop posed
-  [ "$(unit_property Result)" = success ] || fail "its end is taken for a failure: $(unit_property Result)"
+  stop_service
   systemctl start posed
   plug_cameras
   expect_poses 3
-  systemctl stop posed
+  stop_service
 }
 
 # A thread that hangs, here all of them (SIGSTOP): the watchdog is not fed, and systemd kills and restarts the service, which publishes
@@ -98,7 +102,7 @@ case_service_watchdog() {
   wait_until is_another "$before" || fail "it was not restarted"
   expect_journal 'Watchdog timeout'
   expect_poses 5
-  systemctl stop posed
+  stop_service
 }
 
 # Killed, it is restarted at once; the configuration being wrong, it is not, and its state is 'failed' with status 78.
@@ -109,7 +113,7 @@ case_service_restarts() {
   systemctl kill --signal=KILL posed
   wait_until is_another "$before" || fail "it was not restarted"
   expect_poses 3
-  systemctl stop posed
+  stop_service
   sed -i 's/^rate_hz.*/rate_hz = "fast"/' /etc/posed/posed.toml
   ! systemctl start posed 2>/dev/null || fail "it starts with a wrong configuration"
   [ "$(unit_property ExecMainStatus)" = 78 ] || fail "its exit status is $(unit_property ExecMainStatus)"
@@ -130,8 +134,7 @@ case_service_unplugged() {
   expect_journal 'source: frames come'
   expect_poses 3
   [ "$(unit_property MainPID)" = "$before" ] || fail "it was restarted"
-  systemctl stop posed
-  [ "$(unit_property Result)" = success ] || fail "its end is taken for a failure: $(unit_property Result)"
+  stop_service
 }
 
 # A firewall that lets nothing in: the daemon cannot be asked for anything, says so, and publishes; `posectl watch` says so, too.
@@ -149,7 +152,7 @@ case_service_firewalled() {
     --property=StandardError=file:/run/case/watch.log /usr/bin/posectl watch --count 1 || fail "posectl watch takes it for success"
   [ "$(systemctl show posed-case --property=ExecMainStatus --value)" = 69 ] || fail "posectl watch ends with another status than 69"
   grep -q 'LCM receives nothing' watch.log || fail "posectl watch does not say why"
-  systemctl stop posed
+  stop_service
 }
 
 has_line() { gpioinfo "$gpio_chip" | grep -E 'line +0:.*posed'; }
@@ -164,7 +167,7 @@ case_service_lines() {
   systemctl start posed || fail "systemd does not start it"
   expect_poses 3
   wait_until has_line || fail "the line is not taken"
-  systemctl stop posed
+  stop_service
 }
 
 # A reload takes what may change while it runs, names what may not, and refuses a file with mistakes; poses go on.
@@ -181,7 +184,7 @@ case_service_reloads() {
   expect_journal 'no_such_key'
   expect_poses 3
   [ "$(unit_property MainPID)" = "$before" ] || fail "it was restarted"
-  systemctl stop posed
+  stop_service
 }
 
 told_again() { [ "$(journal_of_service | grep -c 'page faults')" -ge 3 ]; }
@@ -193,7 +196,7 @@ case_service_page_faults() {
   wait_until told_again || fail "the status is not told again"
   journal_of_service | grep -o 'page faults.*' | tee told
   [ "$(head -n 1 told)" = "$(tail -n 1 told)" ] || fail "$(head -n 1 told), and later $(tail -n 1 told)"
-  systemctl stop posed
+  stop_service
 }
 
 # An upgrade goes on as before, with the administrator's configuration and the map; a removal stops the service and leaves both; so does a
