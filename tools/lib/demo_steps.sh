@@ -144,5 +144,5 @@ print_table() {
   print_row "tracking p50 / p99 [ms]" track_ms
   print_row "capture to publish p50 / p99 [ms]" latency_ms
   echo
-  echo "  People who walk through the picture pull the estimate with them: taking them out of it is not built yet (README.md)."
+  echo "  People who walk through the picture are left out of the estimate; the last column shows what they do to it where they are not."
 }
