@@ -41,6 +41,7 @@ posed_package_packages=(
 
 posed_fuzz_packages=(
   "clang|compiler with libFuzzer"
+  "libclang-rt-14-dev|libFuzzer itself, and the sanitizers of clang"
 )
 
 posed_test_packages=(
