@@ -77,10 +77,15 @@ MaskReport::MaskReport(Options options, const Config& config)
 
 void MaskReport::add(const TrackedView& view) {
   ++frames_;
-  if (status_ && !options_.draw.empty() && (frames_ - 1) % static_cast<std::uint64_t>(options_.draw_every) == 0) {
+  const bool draws = !options_.draw.empty() && (frames_ - 1) % static_cast<std::uint64_t>(options_.draw_every) == 0;
+  const bool compares = !options_.truth.empty();
+  if (status_ && (draws || compares)) {
+    extractor_.extract(view.frame.gray, features_);
+  }
+  if (status_ && draws) {
     status_ = draw(view);
   }
-  if (status_ && !options_.truth.empty()) {
+  if (status_ && compares) {
     status_ = compare(view);
   }
 }
@@ -99,7 +104,6 @@ Status MaskReport::draw(const TrackedView& view) {
       }
     }
   }
-  extractor_.extract(view.frame.gray, features_);
   for (const Keypoint& keypoint : features_.keypoints) {
     if (is_left_out(view, keypoint.x, keypoint.y)) {
       dot(bgr, keypoint.x, keypoint.y, kLeftOutBgr);
@@ -132,7 +136,6 @@ Status MaskReport::compare(const TrackedView& view) {
       count(pixels_, is_left_out(view, u, v), is_true(u, v));
     }
   }
-  extractor_.extract(view.frame.gray, features_);
   for (const Keypoint& keypoint : features_.keypoints) {
     count(found_, is_left_out(view, keypoint.x, keypoint.y), is_true(keypoint.x, keypoint.y));
   }

@@ -49,11 +49,11 @@ class MaskReport {
 
   Options options_;
   OrbExtractor extractor_;
-  Features features_;
+  Features features_;  // of the whole image
   ColorImage truth_;
   std::vector<std::uint8_t> picture_;
   MaskScore pixels_;
-  MaskScore found_;  // features of the whole image
+  MaskScore found_;  // by those features
   std::uint64_t kept_ = 0;
   std::uint64_t kept_on_movers_ = 0;
   std::uint64_t frames_ = 0;

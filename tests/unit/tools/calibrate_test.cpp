@@ -1,7 +1,6 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -15,11 +14,11 @@
 #include "drivers/tum_writer.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_recording.h"
+#include "tests/unit/tools/posectl_outcome.h"
 #include "tools/posectl/calibration_views.h"
 #include "tools/posectl/camera_text.h"
 #include "tools/posectl/chessboard.h"
 #include "tools/posectl/exit_code.h"
-#include "tools/posectl/posectl.h"
 
 namespace posed {
 namespace {
@@ -139,19 +138,6 @@ std::vector<BoardView> views() {
     }
   }
   return found;
-}
-
-struct Outcome {
-  int exit_code = 0;
-  std::string out;
-  std::string err;
-};
-
-Outcome posectl(std::vector<std::string> arguments) {
-  std::ostringstream out;
-  std::ostringstream err;
-  const int exit_code = run_posectl(std::move(arguments), {out, err, false, false});
-  return {exit_code, out.str(), err.str()};
 }
 
 std::vector<std::string> write_images(const TemporaryFolder& folder, std::size_t count) {

@@ -11,9 +11,9 @@
 
 #include "drivers/image_writer.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/unit/tools/posectl_outcome.h"
 #include "tools/posectl/color_image.h"
 #include "tools/posectl/exit_code.h"
-#include "tools/posectl/posectl.h"
 
 namespace posed {
 namespace {
@@ -25,18 +25,9 @@ using testing::Not;
 // Untrained: it sees people everywhere, so a low threshold gives boxes and a high one none.
 const std::string kSmallOnnx = std::string(POSED_SOURCE_DIR) + "/tests/unit/detect/data/small.onnx";
 
-struct Outcome {
-  int exit_code;
-  std::string out;
-  std::string err;
-};
-
 Outcome detect(std::vector<std::string> arguments) {
-  std::ostringstream out;
-  std::ostringstream err;
   arguments.insert(arguments.begin(), "detect");
-  const int exit_code = run_posectl(std::move(arguments), {out, err});
-  return {exit_code, out.str(), err.str()};
+  return posectl(std::move(arguments));
 }
 
 class DetectCommand : public testing::Test {

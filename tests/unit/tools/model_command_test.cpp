@@ -1,5 +1,4 @@
 #include <cstdint>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -8,9 +7,9 @@
 
 #include "drivers/image_writer.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/unit/tools/posectl_outcome.h"
 #include "tools/posectl/exit_code.h"
 #include "tools/posectl/model_bench.h"
-#include "tools/posectl/posectl.h"
 
 namespace posed {
 namespace {
@@ -21,18 +20,9 @@ using testing::Not;
 
 const std::string kSmallOnnx = POSED_SOURCE_DIR "/tests/unit/detect/data/small.onnx";
 
-struct Outcome {
-  int exit_code = 0;
-  std::string out;
-  std::string err;
-};
-
 Outcome model(std::vector<std::string> arguments) {
-  std::ostringstream out;
-  std::ostringstream err;
   arguments.insert(arguments.begin(), "model");
-  const int exit_code = run_posectl(std::move(arguments), {out, err, false, false});
-  return {exit_code, out.str(), err.str()};
+  return posectl(std::move(arguments));
 }
 
 /// A photograph of nothing: a gradient.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "core/clock.h"
 #include "daemon/message_conversion.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/unit/tools/posectl_outcome.h"
 #include "tools/posectl/exit_code.h"
 #include "tools/posectl/trajectory.h"
 
@@ -24,19 +24,6 @@ namespace posed {
 namespace {
 
 using testing::HasSubstr;
-
-struct Outcome {
-  int exit_code = 0;
-  std::string out;
-  std::string err;
-};
-
-Outcome posectl(std::vector<std::string> arguments) {
-  std::ostringstream out;
-  std::ostringstream err;
-  const int exit_code = run_posectl(std::move(arguments), {out, err, false, false});
-  return {exit_code, out.str(), err.str()};
-}
 
 Trajectory curve(int poses, double scale) {
   Trajectory trajectory;
@@ -51,7 +38,8 @@ Trajectory curve(int poses, double scale) {
 TEST(Posectl, HelpNamesSubcommandsAndExitCodes) {
   const Outcome outcome = posectl({"--help"});
   EXPECT_EQ(outcome.exit_code, kExitOk);
-  for (const char* text : {"replay", "eval", "watch", "synth", "record", "devices", "calibrate", "model", "check-config", "version", "Exit codes", "78"}) {
+  for (const char* text : {"replay", "eval", "watch", "synth", "record", "devices", "calibrate", "model", "check-config", "version",
+                           "Exit codes", "78"}) {
     EXPECT_THAT(outcome.out, HasSubstr(text));
   }
 }

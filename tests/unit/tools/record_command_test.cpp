@@ -1,6 +1,5 @@
 #include <csignal>
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -13,27 +12,14 @@
 #include "core/clock.h"
 #include "drivers/rgbd_source.h"
 #include "tests/support/test_recording.h"
+#include "tests/unit/tools/posectl_outcome.h"
 #include "tools/posectl/camera_text.h"
 #include "tools/posectl/exit_code.h"
-#include "tools/posectl/posectl.h"
 
 namespace posed {
 namespace {
 
 using testing::HasSubstr;
-
-struct Outcome {
-  int exit_code = 0;
-  std::string out;
-  std::string err;
-};
-
-Outcome posectl(std::vector<std::string> arguments) {
-  std::ostringstream out;
-  std::ostringstream err;
-  const int exit_code = run_posectl(std::move(arguments), {out, err, false, false});
-  return {exit_code, out.str(), err.str()};
-}
 
 constexpr const char* kSmallCamera =
     "[camera]\nwidth = 160\nheight = 120\nfx = 131.0\nfy = 131.0\ncx = 79.5\ncy = 59.5\ndistortion = [0.1, 0.0, 0.0, 0.0, 0.0]\n"
