@@ -108,11 +108,20 @@ struct Seen {
   bool operator==(const Seen&) const = default;
 };
 
+/// The lead-in is one image, and as long as the recorder's thread takes to be ready: beyond some repeats the source leaves it out.
+Capture next_after_lead_in(Running& running) {
+  Capture capture = running.next();
+  while (capture.kind == CaptureKind::SkippedFrame && capture.error.message.find("repeats one image") != std::string::npos) {
+    capture = running.next();
+  }
+  return capture;
+}
+
 std::vector<Seen> play(const SourceConfig& config) {
   Running running(config, kClock);
   std::vector<Seen> seen;
   for (;;) {
-    const Capture capture = running.next();
+    const Capture capture = next_after_lead_in(running);
     if (capture.kind != CaptureKind::Frame) {
       EXPECT_EQ(capture.kind, CaptureKind::EndOfStream) << capture.error.message;
       EXPECT_EQ(running.next().kind, CaptureKind::EndOfStream) << "and it stays so";
@@ -148,8 +157,8 @@ TEST_F(OpenNi2RecordingTest, RealtimeKeepsToTheStampsAndEnds) {
   Running running(playing(path, Pacing::Realtime), kClock);
   TimeNs first_ns = 0;
   int frames = 0;
-  Capture capture = running.next();
-  for (; capture.kind == CaptureKind::Frame; capture = running.next()) {
+  Capture capture = next_after_lead_in(running);
+  for (; capture.kind == CaptureKind::Frame; capture = next_after_lead_in(running)) {
     EXPECT_GE(kClock.now_ns(), capture.frame->capture_ns) << "never before it is due";
     const int index = index_of(*capture.frame);
     if (index == 0) {
@@ -209,9 +218,9 @@ TEST_F(OpenNi2RecordingTest, SaysWhereItBreaksOff) {
     SourceConfig config = playing(path, pacing);
     config.live.stall_timeout_s = 0.3;
     Running running(config, kClock);
-    Capture capture = running.next();
+    Capture capture = next_after_lead_in(running);
     int frames = 0;
-    for (; capture.kind == CaptureKind::Frame; capture = running.next()) {
+    for (; capture.kind == CaptureKind::Frame; capture = next_after_lead_in(running)) {
       ++frames;
     }
     EXPECT_GT(frames, kFrames / 8);
