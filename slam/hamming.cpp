@@ -6,7 +6,7 @@ namespace posed {
 
 const HammingKernels& hamming_kernels(SimdLevel level) {
   switch (level) {
-#ifdef POSED_KERNELS_X86
+#ifdef __x86_64__
     case SimdLevel::Avx512: return kernels::kHammingAvx512;
     case SimdLevel::Avx2: return kernels::kHammingAvx2;
 #endif

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "slam/features.h"
-#include "slam/simd_level.h"
+#include "core/simd_level.h"
 
 namespace posed {
 

@@ -1,7 +1,6 @@
 # Sources of the ORB extractor and the Hamming distances. The kernels are compiled once for each instruction set (slam/kernels/simd.h);
 # slam/CMakeLists.txt links POSED_ORB_KERNEL_OBJECTS into posed_slam.
-set(POSED_ORB_SOURCES hamming.cpp kernels/orb_dispatch.cpp orb_corners.cpp orb_extractor.cpp orb_pattern.cpp orb_pyramid.cpp orb_quadtree.cpp
-  simd_level.cpp)
+set(POSED_ORB_SOURCES hamming.cpp kernels/orb_dispatch.cpp orb_corners.cpp orb_extractor.cpp orb_pattern.cpp orb_pyramid.cpp orb_quadtree.cpp)
 set(POSED_ORB_KERNEL_SOURCES kernels/hamming_kernels.cpp kernels/orb_kernels.cpp)
 
 # posed_kernels(LEVEL FLAGS ...): the kernel sources for one instruction set. They are hot, so also development builds optimise them.
@@ -15,15 +14,11 @@ endfunction()
 posed_kernels(baseline)
 set(POSED_ORB_KERNEL_OBJECTS $<TARGET_OBJECTS:posed_kernels_baseline>)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
-  set(POSED_ORB_DEFINITIONS POSED_KERNELS_X86=1)
   posed_kernels(avx2 -mavx2 -mbmi -mpopcnt)
   # gcc 12 takes the undefined vectors inside its own AVX-512 headers for a mistake (GCC bug 105593).
   posed_kernels(avx512 -Wno-uninitialized $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized> -mavx2 -mbmi -mpopcnt -mavx512f -mavx512bw -mavx512cd -mavx512dq -mavx512vl)
   foreach(level avx2 avx512)
     list(APPEND POSED_ORB_KERNEL_OBJECTS $<TARGET_OBJECTS:posed_kernels_${level}>)
-  endforeach()
-  foreach(level baseline avx2 avx512)
-    target_compile_definitions(posed_kernels_${level} PRIVATE ${POSED_ORB_DEFINITIONS})
   endforeach()
 endif()
 

@@ -7,7 +7,7 @@
 #include "config/config.h"
 #include "core/image_view.h"
 #include "slam/features.h"
-#include "slam/simd_level.h"
+#include "core/simd_level.h"
 
 namespace posed {
 

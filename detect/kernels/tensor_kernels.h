@@ -2,7 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
+
+#include "core/simd_level.h"
 
 /// The loops of the network runner that are not oneDNN's. Tensors are interleaved (NHWC: all channels of a pixel side by side)
 /// unless called planar. Sizes are in elements; no pointer needs an alignment. All are reentrant; none allocates.
@@ -57,10 +58,10 @@ struct TensorKernels {
   void (*gate_pixels)(float* values, const float* gates, std::size_t pixels, std::size_t channels);
 };
 
-/// The kernels of each instruction set that this build contains and this machine runs, slowest first; never empty.
-std::span<const TensorKernels* const> supported_tensor_kernels();
+/// The kernels for `level`, one of supported_simd_levels().
+const TensorKernels& tensor_kernels(SimdLevel level);
 
-/// The last of them.
+/// Those for best_simd_level().
 const TensorKernels& tensor_kernels();
 
 }  // namespace posed

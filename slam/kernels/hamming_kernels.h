@@ -5,7 +5,7 @@
 namespace posed::kernels {
 
 extern const HammingKernels kHammingBaseline;
-#ifdef POSED_KERNELS_X86
+#ifdef __x86_64__
 extern const HammingKernels kHammingAvx2;
 extern const HammingKernels kHammingAvx512;
 #endif

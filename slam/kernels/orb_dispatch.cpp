@@ -43,7 +43,7 @@ int disc_half_width(int v) {
 
 const OrbKernels& orb_kernels(SimdLevel level) {
   switch (level) {
-#ifdef POSED_KERNELS_X86
+#ifdef __x86_64__
     case SimdLevel::Avx512: return kernels::kOrbAvx512;
     case SimdLevel::Avx2: return kernels::kOrbAvx2;
 #endif

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "slam/simd_level.h"
+#include "core/simd_level.h"
 
 namespace posed {
 
@@ -76,7 +76,7 @@ struct DiscMask {
 extern const DiscMask kDiscMask;
 
 extern const OrbKernels kOrbBaseline;
-#ifdef POSED_KERNELS_X86
+#ifdef __x86_64__
 extern const OrbKernels kOrbAvx2;
 extern const OrbKernels kOrbAvx512;
 #endif

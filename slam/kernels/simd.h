@@ -7,7 +7,7 @@
 /// functions have internal linkage, so that the linker never hands AVX code to a caller that was compiled without. For the same
 /// reason kernel sources use no templates and no inline functions of the standard library.
 
-#if defined(POSED_KERNELS_X86) && defined(__AVX2__)
+#if defined(__x86_64__) && defined(__AVX2__)
 #include <immintrin.h>
 #define CV_SSE3 1
 #define CV_SSSE3 1

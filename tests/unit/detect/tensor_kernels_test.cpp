@@ -13,9 +13,9 @@ namespace posed {
 namespace {
 
 /// Each of the instruction sets of this machine; odd sizes, so that what is left after whole vectors is reached.
-class TensorKernelsOf : public ::testing::TestWithParam<const TensorKernels*> {
+class TensorKernelsOf : public ::testing::TestWithParam<SimdLevel> {
  protected:
-  const TensorKernels& kernels() const { return *GetParam(); }
+  const TensorKernels& kernels() const { return tensor_kernels(GetParam()); }
 
   std::vector<float> random_floats(std::size_t count) {
     std::vector<float> values(count);
@@ -33,7 +33,7 @@ class TensorKernelsOf : public ::testing::TestWithParam<const TensorKernels*> {
 };
 
 INSTANTIATE_TEST_SUITE_P(EachInstructionSet, TensorKernelsOf,
-                         ::testing::ValuesIn(supported_tensor_kernels().begin(), supported_tensor_kernels().end()));
+                         ::testing::ValuesIn(supported_simd_levels().begin(), supported_simd_levels().end()));
 
 int rounded(float value) {
   return static_cast<int>(std::floor(std::clamp(value, 0.0F, 255.0F) + 0.5F));

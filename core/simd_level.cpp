@@ -1,4 +1,4 @@
-#include "slam/simd_level.h"
+#include "core/simd_level.h"
 
 #include <array>
 #include <cstddef>
@@ -12,7 +12,7 @@ struct SupportedLevels {
 
   SupportedLevels() {
     levels[count++] = SimdLevel::Baseline;
-#ifdef POSED_KERNELS_X86
+#ifdef __x86_64__
     __builtin_cpu_init();
     if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("bmi") || !__builtin_cpu_supports("popcnt")) {
       return;
