@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import onnx
 import torch
+from onnx import numpy_helper
 from torch import nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
@@ -36,7 +37,22 @@ def folded(network: Yolo) -> Yolo:
     return network
 
 
-def export(network: Yolo, anchors: np.ndarray, classes: list[str], name: str, width: int, height: int, path: Path) -> None:
+def halve_weights(model: onnx.ModelProto) -> None:
+    """Convolutions' weights of 16 bits, each with a Cast to the 32 in which all computes: half the file."""
+    weights = {node.input[1] for node in model.graph.node if node.op_type == "Conv"}
+    casts = []
+    for constant in model.graph.initializer:
+        if constant.name in weights:
+            values = numpy_helper.to_array(constant).astype(np.float16)
+            name, stored = constant.name, constant.name + ".half"
+            constant.CopyFrom(numpy_helper.from_array(values, stored))
+            casts.append(onnx.helper.make_node("Cast", [stored], [name], name=name + ".cast", to=onnx.TensorProto.FLOAT))
+    nodes = [*casts, *model.graph.node]
+    del model.graph.node[:]
+    model.graph.node.extend(nodes)
+
+
+def export(network: Yolo, anchors: np.ndarray, classes: list[str], name: str, width: int, height: int, path: Path, half: bool = False) -> None:
     """Anchors are layers x 3 x 2 [pixels]. Both sides of the input are multiples of the coarsest stride."""
     strides = network.options.strides
     if width % strides[-1] or height % strides[-1]:
@@ -50,6 +66,8 @@ def export(network: Yolo, anchors: np.ndarray, classes: list[str], name: str, wi
     properties = {"posed.name": name, "posed.classes": classes, "posed.strides": list(strides),
                   "posed.anchors": np.asarray(anchors).tolist(), "posed.input": [3, height, width]}
     onnx.helper.set_model_props(model, {key: json.dumps(value) for key, value in properties.items()})
+    if half:
+        halve_weights(model)
     onnx.checker.check_model(model)
     onnx.save(model, str(path))
 
@@ -59,11 +77,12 @@ def main() -> int:
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("out", type=Path, help="ONNX file to write; its name without the ending becomes the network's")
     parser.add_argument("--size", type=int, nargs=2, default=(320, 256), metavar=("WIDTH", "HEIGHT"), help="of the input")
+    parser.add_argument("--half", action="store_true", help="weights of 16 bits: half the file, which OpenCV 4.6 cannot read")
     parser.add_argument("--classes", nargs="+", default=["person"])
     args = parser.parse_args()
     try:
         network, saved = load_checkpoint(args.checkpoint)
-        export(network, np.array(saved["anchors"]), args.classes, args.out.stem, *args.size, args.out)
+        export(network, np.array(saved["anchors"]), args.classes, args.out.stem, *args.size, args.out, args.half)
     except DataError as error:
         print(f"export.py: {error}")
         return 65

@@ -101,6 +101,54 @@ TEST(OnnxReader, TakesAConstantByAnotherName) {
   EXPECT_THAT(with_alias("nowhere"), HasSubstr("(Identity): input 'nowhere' is computed by no node"));
 }
 
+TEST(OnnxReader, TakesWeightsOf16Bits) {
+  // Files that are half as large: weights of 16 bits, each with a Cast.
+  const auto with_cast = [](onnx::ModelProto& model, bool of_a_constant, int to) {
+    onnx::NodeProto& convolution = node_of_type(model, "Conv");
+    for (onnx::TensorProto& constant : *model.mutable_graph()->mutable_initializer()) {
+      if (of_a_constant && constant.name() == convolution.input(1)) {
+        const std::size_t count = constant.raw_data().size() / sizeof(float);
+        constant.set_data_type(onnx::TensorProto::FLOAT16);
+        constant.clear_raw_data();
+        for (std::size_t i = 0; i < count; ++i) {
+          constant.add_int32_data(i % 2 == 0 ? 0x3c00 : 0xb800);  // 1 and -0.5
+        }
+      }
+    }
+    onnx::NodeProto cast;
+    cast.set_op_type("Cast");
+    cast.add_input(convolution.input(of_a_constant ? 1 : 0));
+    cast.add_output("floats");
+    onnx::AttributeProto& type = attribute(cast, "to");
+    type.set_type(onnx::AttributeProto::INT);
+    type.set_i(to);
+    convolution.set_input(of_a_constant ? 1 : 0, "floats");
+    model.mutable_graph()->mutable_node()->Add()->CopyFrom(cast);
+    for (int i = model.graph().node_size() - 1; i > 0; --i) {
+      model.mutable_graph()->mutable_node()->SwapElements(i, i - 1);
+    }
+  };
+  onnx::ModelProto model = small_model();
+  with_cast(model, true, onnx::TensorProto::FLOAT);
+  const std::string bytes = model.SerializeAsString();
+  const Result<Network> network = parse_onnx({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, "m.onnx");
+  ASSERT_TRUE(network) << network.error().message;
+  const std::vector<float>* weights = nullptr;
+  for (const Node& node : network->nodes()) {
+    if (const auto* convolution = std::get_if<Convolution>(&node.operation); convolution != nullptr && weights == nullptr) {
+      weights = &convolution->weights;
+    }
+  }
+  ASSERT_NE(weights, nullptr);
+  ASSERT_GE(weights->size(), 2U);
+  EXPECT_EQ(weights->at(0), 1.0F);
+  EXPECT_EQ(weights->at(1), -0.5F);
+  EXPECT_THAT(refusal([&](auto& m) { with_cast(m, true, onnx::TensorProto::DOUBLE); }),
+              HasSubstr("(Cast): only constants of 16 bits"));
+  EXPECT_THAT(refusal([&](auto& m) { with_cast(m, false, onnx::TensorProto::FLOAT); }),
+              HasSubstr("(Cast): input 0 must be a constant"));
+}
+
 TEST(OnnxReader, NamesWhatIsNotSupported) {
   EXPECT_THAT(refusal([](auto& model) { node_of_type(model, "Conv").set_op_type("ConvTranspose"); }),
               AllOf(StartsWith("m.onnx: node '"), HasSubstr("(ConvTranspose): this operator is not supported")));

@@ -122,6 +122,23 @@ class Export(WithImages):
             np.testing.assert_allclose(head, wanted.numpy(), atol=1e-4)
         np.testing.assert_array_equal(detector.anchors, anchors)
 
+    def test_weights_of_16_bits_halve_the_file(self):
+        network = self.randomised()
+        models = {}
+        for name in ("whole", "half"):
+            export(network, np.ones((4, 3, 2)), ["person"], name, 96, 64, self.path / f"{name}.onnx", half=name == "half")
+            models[name] = onnx.load(str(self.path / f"{name}.onnx"))
+        constants = {name: {c.name: onnx.numpy_helper.to_array(c) for c in model.graph.initializer} for name, model in models.items()}
+        casts = {node.output[0]: node.input[0] for node in models["half"].graph.node if node.op_type == "Cast"}
+        convolutions = [node for node in models["half"].graph.node if node.op_type == "Conv"]
+        self.assertGreater(len(convolutions), 50)
+        for node in convolutions:
+            stored, whole = constants["half"][casts[node.input[1]]], constants["whole"][node.input[1]]
+            self.assertEqual(stored.dtype, np.float16)
+            np.testing.assert_allclose(stored.astype(np.float32), whole, rtol=1e-3, atol=1e-6)
+        sizes = {name: (self.path / f"{name}.onnx").stat().st_size for name in models}
+        self.assertLess(sizes["half"], 0.7 * sizes["whole"])
+
     def test_properties_say_what_decoding_takes(self):
         path = self.path / "tiny.onnx"
         export(self.randomised(), np.ones((4, 3, 2)), ["person"], "tiny", 96, 64, path)
