@@ -51,7 +51,8 @@ SlamRig::SlamRig(const Config& config)
       sensor_(static_cast<std::uint32_t>(config.source.synthetic.seed)),
       pool_(config.intrinsics.width, config.intrinsics.height, 1),
       colour_(static_cast<std::size_t>(config.intrinsics.width * config.intrinsics.height)),
-      depth_m_(colour_.size()) {
+      depth_m_(colour_.size()),
+      person_mask_(colour_.size()) {
   restart();
 }
 
@@ -61,7 +62,11 @@ PoseEstimate SlamRig::track(std::uint64_t index, const Spoil& spoil, Mapping map
   if (spoil) {
     spoil(*frame);
   }
-  const PoseEstimate estimate = tracker_->track(*frame, snapshot_, nullptr, mapping == Mapping::Never ? nullptr : &record_);
+  const PoseEstimate estimate =
+      tracker_->track(*frame, snapshot_, detections_ ? &*detections_ : nullptr, mapping == Mapping::Never ? nullptr : &record_);
+  if (detect_every_ > 0 && frame->sequence % static_cast<std::uint64_t>(detect_every_) == 0) {
+    detect_people(*frame);
+  }
   if (estimate.keyframe) {
     T_world_keyframe_[record_.id] = true_pose(index);
   }
@@ -79,12 +84,43 @@ void SlamRig::render(std::uint64_t index, RgbdFrame& frame) {
   const double t_s = static_cast<double>(sequence_) / config_.source.synthetic.rate_hz;
   const ImageView<PackedBgr> colour{colour_.data(), camera.width, camera.height, camera.width, 1};
   const ImageView<float> depth_m{depth_m_.data(), camera.width, camera.height, camera.width, 1};
-  renderer_.render(t_s, true_pose(index), colour, depth_m, {});
+  renderer_.render(t_s, true_pose(index), colour, depth_m, {person_mask_.data(), camera.width, camera.height, camera.width, 1});
   sensor_.measure_depth(sequence_, depth_m, frame.depth_m);
   sensor_.measure_colour(sequence_, t_s, colour, frame.bgr, frame.gray);
   frame.sequence = sequence_++;
   frame.capture_ns = from_seconds(t_s);
   frame.stamp_utc_ns = SyntheticCamera::kEpochUtc_ns + frame.capture_ns;
+}
+
+ImageView<const std::uint8_t> SlamRig::person_mask() const {
+  const CameraIntrinsics& camera = config_.intrinsics;
+  return {person_mask_.data(), camera.width, camera.height, camera.width, 1};
+}
+
+void SlamRig::detect_people(const RgbdFrame& frame) {
+  const ImageView<const std::uint8_t> mask = person_mask();
+  BoundingBox box{static_cast<float>(mask.width), static_cast<float>(mask.height), -1, -1};
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      if (mask.row(y)[x] != 0) {
+        box.x_min = std::min(box.x_min, static_cast<float>(x) - 0.5F);
+        box.y_min = std::min(box.y_min, static_cast<float>(y) - 0.5F);
+        box.x_max = std::max(box.x_max, static_cast<float>(x) + 0.5F);
+        box.y_max = std::max(box.y_max, static_cast<float>(y) + 0.5F);
+      }
+    }
+  }
+  Detections found;
+  found.sequence = frame.sequence;
+  found.capture_ns = frame.capture_ns;
+  found.stamp_utc_ns = frame.stamp_utc_ns;
+  found.image_width = mask.width;
+  found.image_height = mask.height;
+  if (box.area() > 0) {
+    const Detection person{box, 0.9F};
+    found.assign({&person, 1});
+  }
+  detections_ = found;
 }
 
 SlamRig::SavedMap SlamRig::save(const std::string& file) const {
@@ -98,6 +134,7 @@ void SlamRig::restart() {
   tracker_.emplace(config_.tracker, config_.mapper, config_.dynamic, MapMode::Mapping, config_.intrinsics, Se3());
   mapper_.emplace(config_.tracker, config_.mapper, MapMode::Mapping, config_.intrinsics);
   snapshot_ = MapSnapshot();
+  detections_.reset();
   T_world_keyframe_.clear();
 }
 

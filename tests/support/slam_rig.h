@@ -42,6 +42,13 @@ class SlamRig {
   PoseEstimate track(std::uint64_t index, const Spoil& spoil = {}, Mapping mapping = Mapping::AtOnce);
   PoseEstimate track(std::uint64_t index, Mapping mapping) { return track(index, {}, mapping); }
 
+  /// From now on a detector without error looks for the one person in every `frames`-th frame, and is one frame late. 0: none, as
+  /// at the start.
+  void detect_people_every(int frames) { detect_every_ = frames; }
+
+  /// Of the last frame: not 0 where it shows a person.
+  ImageView<const std::uint8_t> person_mask() const;
+
   /// From now on the camera is held here, beside its way.
   void hold_beside(const Se3& T_path_camera) { T_path_camera_ = T_path_camera; }
 
@@ -70,6 +77,9 @@ class SlamRig {
   std::optional<Se3> final_pose(const PoseEstimate& estimate) const;
 
   std::uint64_t frames_a_round() const;
+  const Tracker& tracker() const { return *tracker_; }
+  /// The last keyframe that was handed to the mapper.
+  const KeyframeRecord& record() const { return record_; }
   Mapper& mapper() { return *mapper_; }
   const Mapper& mapper() const { return *mapper_; }
   const MapSnapshot& snapshot() const { return snapshot_; }
@@ -77,6 +87,7 @@ class SlamRig {
 
  private:
   void render(std::uint64_t index, RgbdFrame& frame);
+  void detect_people(const RgbdFrame& frame);
   Se3 true_pose_on_path(std::uint64_t index) const;
 
   Config config_;
@@ -86,6 +97,9 @@ class SlamRig {
   FramePool pool_;
   std::vector<PackedBgr> colour_;
   std::vector<float> depth_m_;
+  std::vector<std::uint8_t> person_mask_;
+  int detect_every_ = 0;
+  std::optional<Detections> detections_;
   std::optional<Tracker> tracker_;
   std::optional<Mapper> mapper_;
   MapSnapshot snapshot_;
