@@ -33,9 +33,10 @@ struct PoseEstimate {
   /// Covariance of xi = (phi, rho) [rad, m] where the true pose is T_map_camera * exp(xi): rotation first, in the camera frame.
   Matrix6d covariance = Matrix6d::Zero();
 
-  std::int32_t keypoints = 0;  ///< extracted in this frame
-  std::int32_t matches = 0;    ///< landmarks matched before outliers were rejected
-  std::int32_t inliers = 0;    ///< landmarks the pose rests on
+  std::int32_t keypoints = 0;    ///< extracted in this frame
+  std::int32_t matches = 0;      ///< landmarks matched before outliers were rejected
+  std::int32_t inliers = 0;      ///< landmarks the pose rests on
+  double residual_variance = 1;  ///< of the inliers, over what the noise model says: larger where the calibration is off
   std::uint32_t map_id = 0;
   std::uint64_t map_version = 0;  ///< of the snapshot that was used
   bool keyframe = false;          ///< the frame was handed to the mapper as a keyframe

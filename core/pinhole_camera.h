@@ -14,6 +14,7 @@ struct CameraIntrinsics {
   double cy = 239.5;
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;  ///< radial-tangential distortion (Brown-Conrady, as in OpenCV)
   double depth_units_per_metre = 5000.0;          ///< raw 16-bit depth / this = metres
+  double depth_delay_s = 0;                       ///< [s] added to RgbdFrame::depth_offset_ns: what the images' stamps do not tell
   double baseline_fx = 40.0;  ///< [pixel metres] baseline times fx: the virtual stereo coordinate is u_r = u - baseline_fx / z
 };
 

@@ -16,6 +16,10 @@ struct RgbdFrame {
   TimeNs capture_ns = 0;          ///< monotonic time of capture; in paced replay, the instant the frame was due
   std::int64_t stamp_utc_ns = 0;  ///< capture time since 1970 UTC; for a recording, the colour image's stamp in its list
 
+  /// When the depth image was taken, counted from the colour image: negative where it was before. Its pixels show what was there
+  /// then.
+  TimeNs depth_offset_ns = 0;
+
   ImageView<std::uint8_t> bgr;   ///< 3 channels, 8 bit
   ImageView<std::uint8_t> gray;  ///< 1 channel, 8 bit; made by the source, which often has it for free (YUYV, NV12, JPEG)
   ImageView<float> depth_m;      ///< metres along z; 0 is invalid

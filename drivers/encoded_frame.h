@@ -22,6 +22,7 @@ struct EncodingOptions {
 struct EncodedFrame {
   std::uint64_t sequence = 0;
   std::int64_t stamp_utc_ns = 0;
+  TimeNs depth_offset_ns = 0;  ///< as in RgbdFrame
   ColorFormat color_format = ColorFormat::Png;
   std::vector<std::uint8_t> color;  ///< a PNG or JPEG file
   std::vector<std::uint8_t> depth;  ///< a 16-bit PNG file

@@ -128,6 +128,7 @@ class FaultySource final : public RgbdSource {
     to.sequence = from.sequence;
     to.capture_ns = from.capture_ns;
     to.stamp_utc_ns = from.stamp_utc_ns;
+    to.depth_offset_ns = from.depth_offset_ns;
     to.T_world_camera_truth = from.T_world_camera_truth;
     copy_images(fault.kind == FaultKind::Freeze && before_freeze_ ? *before_freeze_ : from, to);
     const int half = to.gray.height / 2;

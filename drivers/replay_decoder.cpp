@@ -116,6 +116,7 @@ void ReplayDecoder::decode(std::uint64_t pass, std::size_t index, ReplayItem& it
   RgbdFrame& frame = **slot;
   frame.sequence = pass * sequence_.pairs.size() + index;
   frame.stamp_utc_ns = first_ns + item.elapsed_ns;
+  frame.depth_offset_ns = pair.depth.stamp_ns - pair.color.stamp_ns;
   if (Status decoded = decode_images(pair, frame); !decoded) {
     item.kind = CaptureKind::SkippedFrame;
     item.error = std::move(decoded.error());

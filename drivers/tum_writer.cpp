@@ -1,5 +1,6 @@
 #include "drivers/tum_writer.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <fcntl.h>
 #include <initializer_list>
@@ -80,8 +81,9 @@ Status TumWriter::add_frame(const EncodedFrame& frame) {
     return written;
   }
   last_stamp_ns_ = frame.stamp_utc_ns;
+  last_depth_stamp_ns_ = std::max(last_depth_stamp_ns_ + 1, frame.stamp_utc_ns + frame.depth_offset_ns);
   color_.pending += fmt::format("{} {}\n", stamp, color);
-  depth_.pending += fmt::format("{} {}\n", stamp, depth);
+  depth_.pending += fmt::format("{} {}\n", format_stamp(last_depth_stamp_ns_), depth);
   if (frame.T_world_camera_truth) {
     groundtruth_.pending += groundtruth_line(stamp, *frame.T_world_camera_truth);
   }

@@ -19,7 +19,8 @@ struct TumWriterOptions : EncodingOptions {
 };
 
 /// Writes frames as a recording in the TUM RGB-D layout: rgb/STAMP.png, depth/STAMP.png, rgb.txt, depth.txt and, where frames carry
-/// the true pose, groundtruth.txt (stamp tx ty tz qx qy qz qw of T_world_camera).
+/// the true pose, groundtruth.txt (stamp tx ty tz qx qy qz qw of T_world_camera). Files have the stamp of the colour image;
+/// depth.txt says when the depth image was taken.
 ///
 /// The recording is valid at any moment and holds the committed frames: a line stands in a list only after its images are whole
 /// files, and in rgb.txt last. So one that is broken off by a kill keeps every committed frame, and with `sync` a power cut
@@ -59,6 +60,7 @@ class TumWriter {
   FileDescriptor directory_;  // opened before the first file, so that syncing tells of errors since then
   EncodedFrame encoded_;
   std::int64_t last_stamp_ns_ = -1;
+  std::int64_t last_depth_stamp_ns_ = -1;  // no two are the same, and the list is ordered
   std::uint64_t frames_pending_ = 0;
   std::uint64_t frames_committed_ = 0;
   List color_;

@@ -17,6 +17,30 @@ float depth_at(ImageView<const float> depth_m, float x, float y) {
   return std::isfinite(z) && z > 0 ? z : 0.0F;
 }
 
+constexpr int kFollowSteps = 2;        // what the second one changes is below a depth image's own steps
+constexpr float kSameSurface = 0.05F;  // share of the depth by which one surface may change in a step
+
+/// Depth along an ideal pixel's ray when the colour image was taken, from a depth image of another time; `z` is the depth that it
+/// has at this pixel. The point there is looked up where the camera saw it in the other image, and moved by what it is off, as a
+/// surface across the ray would be.
+float follow(const PinholeCamera& camera, ImageView<const float> depth_m, const Eigen::Vector2f& ideal_pixel, float z,
+             const Se3& T_depth_color) {
+  for (int step = 0; step < kFollowSteps; ++step) {
+    const Eigen::Vector3d p = T_depth_color * camera.unproject(ideal_pixel.cast<double>(), z);
+    if (p.z() <= 0) {
+      return 0.0F;
+    }
+    const Eigen::Vector2f pixel = camera.distort(camera.project(p)).cast<float>();
+    const float seen = depth_at(depth_m, pixel.x(), pixel.y());
+    const float change = seen - static_cast<float>(p.z());
+    if (std::abs(change) > kSameSurface * seen) {
+      return 0.0F;
+    }
+    z += change;
+  }
+  return z;
+}
+
 }  // namespace
 
 FeatureFrame::FeatureFrame(const PinholeCamera& camera, std::size_t capacity) {
@@ -45,12 +69,12 @@ int FeatureFrame::row_of(float v) const {
   return std::clamp(static_cast<int>((v - min_v_) * rows_per_pixel_), 0, kRows - 1);
 }
 
-void FeatureFrame::place(const PinholeCamera& camera, ImageView<const float> depth_m) {
-  look_up(camera, depth_m);
+void FeatureFrame::place(const PinholeCamera& camera, ImageView<const float> depth_m, const std::optional<Se3>& T_depth_color) {
+  look_up(camera, depth_m, T_depth_color);
   complete(camera);
 }
 
-void FeatureFrame::look_up(const PinholeCamera& camera, ImageView<const float> depth_m) {
+void FeatureFrame::look_up(const PinholeCamera& camera, ImageView<const float> depth_m, const std::optional<Se3>& T_depth_color) {
   trust_.assign(size(), 1.0F);
   ideal_pixels_.resize(size());
   depth_m_.resize(size());
@@ -58,6 +82,9 @@ void FeatureFrame::look_up(const PinholeCamera& camera, ImageView<const float> d
     const Keypoint& k = features_.keypoints[i];
     ideal_pixels_[i] = camera.undistort({k.x, k.y}).cast<float>();
     depth_m_[i] = depth_at(depth_m, k.x, k.y);
+    if (T_depth_color && depth_m_[i] > 0) {
+      depth_m_[i] = follow(camera, depth_m, ideal_pixels_[i], depth_m_[i], *T_depth_color);
+    }
   }
 }
 

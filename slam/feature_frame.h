@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "config/config.h"
 #include "core/pinhole_camera.h"
 #include "core/rgbd_frame.h"
+#include "core/se3.h"
 #include "slam/features.h"
 
 namespace posed {
@@ -20,13 +22,17 @@ class FeatureFrame {
   /// `capacity`: keypoints to make room for.
   FeatureFrame(const PinholeCamera& camera, std::size_t capacity);
 
-  /// Completes `features()` after the extractor has filled them: undistorts, looks depths up, sorts into the grid.
-  void place(const PinholeCamera& camera, ImageView<const float> depth_m);
+  /// Completes `features()` after the extractor has filled them: undistorts, looks depths up, sorts into the grid. `T_depth_color`
+  /// is the motion of the camera between the two images: points of the camera frame when the colour image was taken, seen from the
+  /// camera frame when the depth image was. Depths are those at the time of the colour image; where the surface cannot be followed
+  /// from the one image to the other (an edge), there is none.
+  void place(const PinholeCamera& camera, ImageView<const float> depth_m, const std::optional<Se3>& T_depth_color = std::nullopt);
 
   /// The same, but `trust_of(keypoint, depth_m)` says how far each keypoint is to be trusted, 0 to 1; those with 0 are left out.
   template <typename TrustOf>
-  void place(const PinholeCamera& camera, ImageView<const float> depth_m, TrustOf&& trust_of) {
-    look_up(camera, depth_m);
+  void place(const PinholeCamera& camera, ImageView<const float> depth_m, const std::optional<Se3>& T_depth_color,
+             TrustOf&& trust_of) {
+    look_up(camera, depth_m, T_depth_color);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < features_.keypoints.size(); ++i) {
       const float trust = trust_of(features_.keypoints[i], depth_m_[i]);
@@ -69,7 +75,7 @@ class FeatureFrame {
   static constexpr int kRows = 36;
   int column_of(float u) const;
   int row_of(float v) const;
-  void look_up(const PinholeCamera& camera, ImageView<const float> depth_m);
+  void look_up(const PinholeCamera& camera, ImageView<const float> depth_m, const std::optional<Se3>& T_depth_color);
   void shrink(std::size_t count);
   void complete(const PinholeCamera& camera);  // disparities and the grid, out of pixels and depths
 

@@ -27,6 +27,9 @@ class MotionModel {
     has_pose_ = true;
   }
 
+  /// How the camera moves in `duration_ns`, which may be negative: its pose then, in its frame now.
+  Se3 motion_over(TimeNs duration_ns) const { return Se3::exp(velocity_ * to_seconds(duration_ns)); }
+
   /// The last pose, moved on to `stamp_ns`; not at all where the last pose is too old for its velocity to hold.
   Se3 predict(std::int64_t stamp_ns) const {
     const std::int64_t elapsed_ns = stamp_ns - stamp_ns_;

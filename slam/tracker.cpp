@@ -44,6 +44,7 @@ struct Tracker::Impl {
   PoseEstimate track(const RgbdFrame& rgbd, const MapSnapshot& map, const Detections* newest, KeyframeRecord* candidate);
   void extract(const RgbdFrame& rgbd);
   void extract_warily(const RgbdFrame& rgbd);
+  std::optional<Se3> T_depth_color(const RgbdFrame& rgbd) const;
   void leave_movers_out(const MapSnapshot& map);
   void adopt(const MapSnapshot& map);
   bool can_initialize() const;
@@ -120,10 +121,16 @@ Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, co
   }
 }
 
+/// How the camera moved between the two images of a frame, by its last known velocity; nothing where they are of one instant.
+std::optional<Se3> Tracker::Impl::T_depth_color(const RgbdFrame& rgbd) const {
+  const TimeNs offset_ns = rgbd.depth_offset_ns + from_seconds(camera.intrinsics().depth_delay_s);
+  return offset_ns == 0 ? std::nullopt : std::optional(motion.motion_over(-offset_ns));
+}
+
 /// Features of what is not known to move; as many as without movers, so that the static rest gets more.
 void Tracker::Impl::extract(const RgbdFrame& rgbd) {
   extractor.extract(rgbd.gray, frame.features(), mask ? mask->interior() : std::span<const std::uint8_t>());
-  frame.place(camera, rgbd.depth_m,
+  frame.place(camera, rgbd.depth_m, T_depth_color(rgbd),
               [this](const Keypoint& k, float depth_m) { return mask && mask->is_mover(k.x, k.y, depth_m) ? 0.0F : 1.0F; });
 }
 
@@ -131,7 +138,7 @@ void Tracker::Impl::extract(const RgbdFrame& rgbd) {
 /// do not, the others outvote them.
 void Tracker::Impl::extract_warily(const RgbdFrame& rgbd) {
   extractor.extract(rgbd.gray, frame.features());
-  frame.place(camera, rgbd.depth_m,
+  frame.place(camera, rgbd.depth_m, T_depth_color(rgbd),
               [this](const Keypoint& k, float depth_m) { return mask->is_mover(k.x, k.y, depth_m) ? kMoverTrust : 1.0F; });
   localizer.reset(frame);
 }
@@ -408,6 +415,7 @@ PoseEstimate Tracker::Impl::describe(const MapSnapshot& map, KeyframeRecord* can
     estimate.covariance =
         starts_map ? start_covariance() : pose_covariance(localizer.solution(), localizer.landmark_of(), map, anchors);
     estimate.inliers = localizer.solution().inliers;
+    estimate.residual_variance = localizer.solution().variance_factor;
     estimate.keyframe = candidate != nullptr && (starts_map || wants_keyframe(map));
     if (estimate.keyframe) {
       fill_keyframe(*candidate, map);

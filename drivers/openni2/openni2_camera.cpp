@@ -177,6 +177,7 @@ CameraRead OpenNi2Camera::deliver(RgbdFrame* frame) {
     write_color(color, device_[Kind::Color].mirrored, *frame);
     write_depth(depth, device_[Kind::Depth].mirrored, *frame);
     frame->sequence = static_cast<std::uint32_t>(color.getFrameIndex());
+    frame->depth_offset_ns = device_ns(depth) - device_ns(color);
     if (recording_) {
       stamp_recorded(*frame, device_ns(color));
     } else {

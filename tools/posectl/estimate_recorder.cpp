@@ -6,7 +6,12 @@ void EstimateRecorder::record(const PoseEstimate& estimate) {
   frames_.push_back({estimate.sequence, estimate.stamp_utc_ns});
   if (estimate.has_pose()) {
     records_.push_back({estimate.stamp_utc_ns, estimate.T_map_camera(), estimate.reference_keyframe, estimate.T_reference_camera});
+    residual_variances_ += estimate.residual_variance;
   }
+}
+
+double EstimateRecorder::residual_variance() const {
+  return records_.empty() ? 0.0 : residual_variances_ / static_cast<double>(records_.size());
 }
 
 Trajectory EstimateRecorder::online_trajectory() const {

@@ -33,6 +33,9 @@ class EstimateRecorder {
   /// T_map_camera rebuilt from where the reference keyframes are now.
   Final final_trajectory(const std::function<std::optional<Se3>(std::uint64_t)>& keyframe_pose) const;
 
+  /// Mean of PoseEstimate::residual_variance over the frames with a pose; 0 where there are none.
+  double residual_variance() const;
+
   struct Frame {
     std::uint64_t sequence = 0;
     std::int64_t stamp_utc_ns = 0;
@@ -47,7 +50,8 @@ class EstimateRecorder {
     std::uint64_t reference_keyframe = 0;
     Se3 T_reference_camera;
   };
-  std::vector<Record> records_;  // of frames with a pose
+  std::vector<Record> records_;    // of frames with a pose
+  double residual_variances_ = 0;  // their sum
   std::vector<Frame> frames_;
 };
 

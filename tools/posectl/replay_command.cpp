@@ -189,11 +189,12 @@ int run_replay(const ReplayOptions& options, const Console& console) {
   }
   const std::uint64_t total_frames = (*app)->source_info().total_frames;
   recorder.emplace(total_frames > 0 ? total_frames : kFramesWhereUnknown);
-  const Result<ReplayStats> stats = run_to_end(**app, options, console);
+  Result<ReplayStats> stats = run_to_end(**app, options, console);
   if (!stats) {
     return report_error(console.err, stats.error());
   }
   source_errors.print_rest(console.err);
+  stats->residual_variance = recorder->residual_variance();
   const Status written =
       write_outputs(options, *stats, *recorder, **app, console.err)
           .and_then([&] { return options.groundtruth.empty() ? Status{} : write_truth(options.groundtruth, *config, *recorder); })

@@ -50,6 +50,7 @@ std::string to_json(const ReplayStats& stats) {
       {"lost", health.frames_lost},
       {"dropped", frames_dropped(health)},
       {"skipped", health.frames_skipped},
+      {"residual_variance", stats.residual_variance},
       {"keyframes", health.keyframes},
       {"keyframes_delayed", health.keyframes_delayed},
       {"poses_published", health.poses_published},
@@ -84,6 +85,7 @@ std::string format_replay_summary(const ReplayStats& stats) {
   return fmt::format("{}{}\n", stats.source.description, stats.interrupted ? " (interrupted)" : "") +
          fmt::format("frames       {}: tracked {} ({:.1f} %), lost {}, dropped {}; skipped {}\n", frames, health.frames_tracked,
                      share, health.frames_lost, frames_dropped(health), health.frames_skipped) +
+         fmt::format("residuals    variance {:.3f} of the noise model's\n", stats.residual_variance) +
          fmt::format("map          {} keyframes, {} landmarks\n", health.map_keyframes, health.map_landmarks) +
          latency_line("track [ms]", health.track) + latency_line("latency [ms]", health.latency) +
          latency_line("map [ms]", health.map) + (health.detected > 0 ? latency_line("detect [ms]", health.detect) : "") +

@@ -15,6 +15,7 @@ struct ReplayStats {
   bool lockstep = false;
   bool interrupted = false;  ///< by a signal, before the source had ended
   double wall_s = 0;
+  double residual_variance = 0;  ///< EstimateRecorder::residual_variance
   HealthReport health;
 };
 
