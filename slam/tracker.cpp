@@ -43,7 +43,6 @@ struct Tracker::Impl {
 
   PoseEstimate track(const RgbdFrame& rgbd, const MapSnapshot& map, const Detections* newest, KeyframeRecord* candidate);
   void extract(const RgbdFrame& rgbd);
-  void extract_warily(const RgbdFrame& rgbd);
   std::optional<Se3> T_depth_color(const RgbdFrame& rgbd) const;
   void leave_movers_out(const MapSnapshot& map);
   void adopt(const MapSnapshot& map);
@@ -121,25 +120,20 @@ Tracker::Impl::Impl(const TrackerConfig& tracker, const MapperConfig& mapper, co
   }
 }
 
-/// How the camera moved between the two images of a frame, by its last known velocity; nothing where they are of one instant.
+/// How the camera moved between a frame's two images, by its last known velocity; nothing where they are of one instant.
 std::optional<Se3> Tracker::Impl::T_depth_color(const RgbdFrame& rgbd) const {
   const TimeNs offset_ns = rgbd.depth_offset_ns + from_seconds(camera.intrinsics().depth_delay_s);
   return offset_ns == 0 ? std::nullopt : std::optional(motion.motion_over(-offset_ns));
 }
 
-/// Features of what is not known to move; as many as without movers, so that the static rest gets more.
+/// Features of what is not known to move; as many as without movers, so that the static rest gets more. Where that does not carry a
+/// pose, the tracker is wary: features of movers too, at little weight. They may stand still, after all, and if they do not, the
+/// others outvote them.
 void Tracker::Impl::extract(const RgbdFrame& rgbd) {
-  extractor.extract(rgbd.gray, frame.features(), mask ? mask->interior() : std::span<const std::uint8_t>());
-  frame.place(camera, rgbd.depth_m, T_depth_color(rgbd),
-              [this](const Keypoint& k, float depth_m) { return mask && mask->is_mover(k.x, k.y, depth_m) ? 0.0F : 1.0F; });
-}
-
-/// Where what is left does not carry a pose: features of movers too, at little weight. They may stand still, after all, and if they
-/// do not, the others outvote them.
-void Tracker::Impl::extract_warily(const RgbdFrame& rgbd) {
-  extractor.extract(rgbd.gray, frame.features());
-  frame.place(camera, rgbd.depth_m, T_depth_color(rgbd),
-              [this](const Keypoint& k, float depth_m) { return mask->is_mover(k.x, k.y, depth_m) ? kMoverTrust : 1.0F; });
+  extractor.extract(rgbd.gray, frame.features(), mask && !wary ? mask->interior() : std::span<const std::uint8_t>());
+  frame.place(camera, rgbd.depth_m, T_depth_color(rgbd), [this](const Keypoint& k, float depth_m) {
+    return mask && mask->is_mover(k.x, k.y, depth_m) ? (wary ? kMoverTrust : 0.0F) : 1.0F;
+  });
   localizer.reset(frame);
 }
 
@@ -358,13 +352,12 @@ PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map,
   }
   const TimeNs masked_ns = now_ns();
   timing.mask_ns = masked_ns - begin_ns;
+  wary = false;
   extract(rgbd);
   const TimeNs extracted_ns = now_ns();
   timing.extract_ns = extracted_ns - masked_ns;
-  localizer.reset(frame);
   ++frames_since_keyframe;
   starts_map = false;
-  wary = false;
   T_map_odom = map.T_map_odom;
 
   if (!has_map && map.version > 0 && !map.keyframes.empty()) {
@@ -375,7 +368,7 @@ PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map,
     find_camera(map);
     if (was_tracking && state == TrackingState::Lost && mask && mask->summary().masked_share > kMuchMasked) {
       wary = true;
-      extract_warily(rgbd);
+      extract(rgbd);
       state = track_by_motion(map) ? TrackingState::Tracking : TrackingState::Lost;
     }
   }

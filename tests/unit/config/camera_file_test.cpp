@@ -71,6 +71,16 @@ TEST(CameraFile, WrittenTextReadsBackTheSame) {
   EXPECT_EQ(again->k3, 0.5);
 }
 
+TEST(CameraFile, TheDepthsDelayMayBeGiven) {
+  EXPECT_EQ(parse_camera(kCamera, "lens.toml")->depth_delay_s, 0.0);
+  const Result<CameraIntrinsics> camera =
+      parse_camera(with("baseline_fx = 40.0", "baseline_fx = 40.0\ndepth_delay_s = -0.016"), "lens.toml");
+  ASSERT_TRUE(camera) << camera.error().message;
+  EXPECT_EQ(camera->depth_delay_s, -0.016);
+  EXPECT_EQ(error_of(with("baseline_fx = 40.0", "depth_delay_s = 1.0\nbaseline_fx = 40.0")),
+            "lens.toml:10:17: camera.depth_delay_s: 1.0: out of range, allowed -0.2 to 0.2");
+}
+
 TEST(CameraFile, WithoutDistortionThereIsNone) {
   const Result<CameraIntrinsics> camera = parse_camera(with("distortion = [0.1, -0.2, 0.003, 0.004, 0.5]\n", ""), "lens.toml");
   ASSERT_TRUE(camera) << camera.error().message;
@@ -81,7 +91,7 @@ TEST(CameraFile, WithoutDistortionThereIsNone) {
   EXPECT_EQ(camera->k3, 0.0);
 }
 
-TEST(CameraFile, EveryOtherKeyIsRequired) {
+TEST(CameraFile, AllButDistortionAndDelayAreRequired) {
   EXPECT_EQ(error_of(""),
             "lens.toml: camera.width: missing, expected integer, allowed 32 to 8192\n"
             "lens.toml: camera.height: missing, expected integer, allowed 32 to 8192\n"

@@ -13,6 +13,8 @@
 namespace posed {
 namespace {
 
+constexpr TimeNs kDepthOffsetNs = 4 * kNsPerMs;
+
 /// Frame n shows n everywhere and is taken at n periods.
 class CountingSource final : public RgbdSource {
  public:
@@ -32,6 +34,7 @@ class CountingSource final : public RgbdSource {
     writer->sequence = next_++;
     writer->capture_ns = clock_.now_ns();
     writer->stamp_utc_ns = clock_.utc_ns(writer->capture_ns);
+    writer->depth_offset_ns = kDepthOffsetNs;
     const auto value = static_cast<std::uint8_t>(writer->sequence + 1);
     for (int y = 0; y < info_.height; ++y) {
       std::fill_n(writer->bgr.row(y), info_.width * 3, value);
@@ -79,6 +82,7 @@ TEST_F(FaultInjection, DropsThinsAndDoubles) {
 TEST_F(FaultInjection, SpoilsPixels) {
   inject({"black 0-0", "white 1-1", "zero_depth 2-2", "nan_depth 3-3", "half 4-4"});
   Capture capture = next();
+  EXPECT_EQ(capture.frame->depth_offset_ns, kDepthOffsetNs);
   EXPECT_EQ(capture.frame->gray.at(7, 5), 0);
   EXPECT_EQ(capture.frame->bgr.at(7, 5), 0);
   EXPECT_EQ(capture.frame->depth_m.at(7, 5), 1.0F);

@@ -55,6 +55,32 @@ TEST(TumWriter, WhatItWritesPairsExactly) {
   EXPECT_EQ(sequence->period_ns, kTestPeriodNs);
 }
 
+TEST(TumWriter, DepthKeepsItsOwnTime) {
+  const TemporaryFolder folder;
+  Result<TumWriter> writer = TumWriter::create(folder.path(), {});
+  ASSERT_TRUE(writer);
+  FramePool pool(kTestWidth, kTestHeight, 1);
+  FrameWriter frame = *pool.acquire();
+  // The third frame has the depth image of the second: a list has no stamp twice, so it is a nanosecond later.
+  const std::vector<TimeNs> offsets{-7 * kNsPerMs, 16 * kNsPerMs, 16 * kNsPerMs - kTestPeriodNs};
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    paint(*frame, static_cast<int>(i));
+    frame->stamp_utc_ns = kTestStampNs + static_cast<TimeNs>(i) * kTestPeriodNs;
+    frame->depth_offset_ns = offsets[i];
+    ASSERT_TRUE(writer->add_frame(*frame));
+  }
+  ASSERT_TRUE(writer->commit());
+  ReplayConfig config;
+  config.sequence = folder.path().string();
+  const Result<TumSequence> sequence = load_tum_sequence(config);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  ASSERT_EQ(sequence->pairs.size(), 3U);
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    const TumAssociation& pair = sequence->pairs[i];
+    EXPECT_NEAR(static_cast<double>(pair.depth.stamp_ns - pair.color.stamp_ns), static_cast<double>(offsets[i]), 1.0) << i;
+  }
+}
+
 TEST(TumWriter, NeverWritesIntoARecording) {
   const TemporaryFolder folder;
   write_recording(folder.path(), 1);

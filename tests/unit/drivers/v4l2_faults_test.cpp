@@ -11,6 +11,7 @@ namespace {
 
 using testing::AllOf;
 using testing::Contains;
+using testing::Each;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -32,6 +33,7 @@ class V4l2Faults : public testing::Test, public V4l2Rig {
         EXPECT_TRUE(stamps_.empty() || got.frame->capture_ns > stamps_.back());
         EXPECT_TRUE(sequences_.empty() || got.frame->sequence > sequences_.back());
         stamps_.push_back(got.frame->capture_ns);
+        depth_offsets_.push_back(got.frame->depth_offset_ns);
         sequences_.push_back(got.frame->sequence);
       } else {
         EXPECT_EQ(got.kind, CaptureKind::Stopped) << got.error.message;
@@ -42,6 +44,7 @@ class V4l2Faults : public testing::Test, public V4l2Rig {
 
   void forget() {
     stamps_.clear();
+    depth_offsets_.clear();
     sequences_.clear();
     interruptions_.clear();
     skipped_.clear();
@@ -83,6 +86,7 @@ class V4l2Faults : public testing::Test, public V4l2Rig {
   FramePool pool_;
   std::unique_ptr<RgbdSource> source_;
   std::vector<TimeNs> stamps_;
+  std::vector<TimeNs> depth_offsets_;  // of the same frames
   std::vector<std::uint64_t> sequences_;
   std::vector<std::string> interruptions_;
   std::vector<std::string> skipped_;
@@ -109,6 +113,7 @@ TEST_F(V4l2Faults, MonotonicStampsAreUsedAsTheyAre) {
   for (const TimeNs stamp_ns : stamps_) {
     EXPECT_EQ(stamp_ns % (40 * kNsPerMs), 7 * kNsPerMs) << "the colour image's";
   }
+  EXPECT_THAT(depth_offsets_, Each(3 * kNsPerMs));
 }
 
 TEST_F(V4l2Faults, StampsOfAnotherClockAreBroughtToOurs) {

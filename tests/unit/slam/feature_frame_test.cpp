@@ -67,6 +67,45 @@ TEST_F(FeatureFrameTest, UndistortsAndLooksDepthUpAtTheSeenPixel) {
   EXPECT_NEAR(back.y(), 99.8, 1e-3);
 }
 
+TEST_F(FeatureFrameTest, DepthIsThatWhenTheColourImageWasTaken) {
+  add(320, 250);
+  add(100, 80);
+  frame.place(camera, depth_view, Se3(Eigen::Quaterniond::Identity(), {0, 0, -0.03}));  // the camera came 0.03 m nearer meanwhile
+  EXPECT_NEAR(frame.depth_m()[0], 2.03F, 1e-5F);
+  EXPECT_NEAR(frame.depth_m()[1], 2.03F, 1e-5F);
+}
+
+TEST_F(FeatureFrameTest, DepthOfASlantedSurfaceIsLookedUpWhereTheCameraSawIt) {
+  // The plane z = 1.5 + x / 2, seen when the depth image was taken.
+  const CameraIntrinsics& k = camera.intrinsics();
+  for (int v = 0; v < 480; ++v) {
+    for (int u = 0; u < 640; ++u) {
+      const double x = (camera.undistort({static_cast<double>(u), static_cast<double>(v)}).x() - k.cx) / k.fx;
+      depth[static_cast<std::size_t>(v * 640 + u)] = static_cast<float>(1.5 / (1 - x / 2));
+    }
+  }
+  for (const float u : {100.0F, 320.0F, 500.0F}) {
+    add(u, 240);
+  }
+  const Eigen::Vector3d moved(0.05, 0, 0);  // p_depth = p_color + moved: in the colour image the plane is z = 1.5 + (x + 0.05) / 2
+  frame.place(camera, depth_view, Se3(Eigen::Quaterniond::Identity(), moved));
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const double x = (static_cast<double>(frame.ideal_pixels()[i].x()) - k.cx) / k.fx;
+    EXPECT_NEAR(frame.depth_m()[i], 1.525 / (1 - x / 2), 0.003) << i;  // of the nearest pixel; 0.025 off if it were not moved
+  }
+}
+
+TEST_F(FeatureFrameTest, WhereTheSurfaceIsLostBetweenTheImagesThereIsNoDepth) {
+  for (int v = 0; v < 480; ++v) {
+    std::fill_n(depth.begin() + v * 640 + 310, 330, 1.0F);  // something nearer, on the right
+  }
+  add(305, 240);
+  add(200, 240);
+  frame.place(camera, depth_view, Se3(Eigen::Quaterniond::Identity(), {0.05, 0, 0}));  // 13 pixels at 2 m
+  EXPECT_EQ(frame.depth_m()[0], 0.0F) << "the edge has passed over it";
+  EXPECT_NEAR(frame.depth_m()[1], 2.0F, 1e-5F);
+}
+
 TEST_F(FeatureFrameTest, TreatsMissingAndBrokenDepthAsNone) {
   for (const float broken : {0.0F, -1.0F, std::nanf(""), INFINITY}) {
     depth[0] = broken;

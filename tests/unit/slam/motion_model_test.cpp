@@ -26,6 +26,15 @@ TEST(MotionModel, ScalesWithTheTimeThatPassed) {
   EXPECT_LT((predicted.inverse() * Se3::exp(4.0 * kStep)).log().norm(), 1e-6);
 }
 
+TEST(MotionModel, SaysHowFarItMovesInATime) {
+  MotionModel motion;
+  EXPECT_LT(motion.motion_over(kFrame).log().norm(), 1e-12) << "not known to move";
+  motion.observe(Se3(), 0);
+  motion.observe(Se3::exp(kStep), kFrame);
+  EXPECT_LT((motion.motion_over(kFrame / 2).inverse() * Se3::exp(0.5 * kStep)).log().norm(), 1e-9);
+  EXPECT_LT((motion.motion_over(-kFrame) * Se3::exp(kStep)).log().norm(), 1e-9) << "where it was before";
+}
+
 TEST(MotionModel, StaysWhereItWasWithoutAVelocity) {
   MotionModel motion;
   const Se3 pose = Se3::exp(kStep);

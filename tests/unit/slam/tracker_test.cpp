@@ -1,6 +1,8 @@
 #include "slam/tracker.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
@@ -25,6 +27,51 @@ TEST(Tracker, FollowsTheCameraThroughTheRoom) {
   }
   EXPECT_LT(std::sqrt(squared / kFrames), 0.03);
   EXPECT_GT(rig.mapper().keyframe_count(), 1U);
+}
+
+// Depth images a whole frame older than the colour images they come with, as of two cameras out of step, at the worst.
+TEST(Tracker, DepthOfAnotherTimeIsMovedToTheColourImages) {
+  constexpr TimeNs kFrame_ns = kNsPerSecond / 30;
+  struct Case {
+    TimeNs stamped_ns;     // what the stamps say
+    double depth_delay_s;  // what the calibration adds
+  };
+  std::vector<double> rmse;
+  std::vector<double> variance;
+  for (const Case& given : {Case{0, 0}, Case{-kFrame_ns, 0}, Case{0, -1.0 / 30}}) {
+    Config config = rig_config();
+    config.intrinsics.depth_delay_s = given.depth_delay_s;
+    SlamRig rig(config);
+    ASSERT_NEAR(config.source.synthetic.rate_hz, 30.0, 1e-9);
+    std::vector<float> before;
+    const auto older_depth = [&](RgbdFrame& frame) {
+      std::vector<float> now;
+      for (int y = 0; y < frame.depth_m.height; ++y) {
+        now.insert(now.end(), frame.depth_m.row(y), frame.depth_m.row(y) + frame.depth_m.width);
+      }
+      for (int y = 0; !before.empty() && y < frame.depth_m.height; ++y) {
+        std::copy_n(before.begin() + y * frame.depth_m.width, frame.depth_m.width, frame.depth_m.row(y));
+      }
+      before = std::move(now);
+      frame.depth_offset_ns = given.stamped_ns;
+    };
+    double squared = 0;
+    double variances = 0;
+    constexpr std::uint64_t kFrames = 90;
+    for (std::uint64_t i = 0; i < kFrames; ++i) {
+      // To and fro, since a delay that never changes its direction is hard to tell from another place.
+      const auto index = static_cast<std::uint64_t>(std::lround(40 * (1 - std::cos(0.05 * M_PI * static_cast<double>(i)))));
+      const PoseEstimate estimate = rig.track(index, older_depth);
+      ASSERT_TRUE(estimate.has_pose()) << i;
+      squared += std::pow(rig.error_m(index, estimate), 2);
+      variances += estimate.residual_variance;
+    }
+    rmse.push_back(std::sqrt(squared / kFrames));
+    variance.push_back(variances / kFrames);
+  }
+  EXPECT_LT(rmse[1], 0.5 * rmse[0]);
+  EXPECT_LT(variance[1], 0.8 * variance[0]) << "by which a delay that no stamp tells is found";
+  EXPECT_NEAR(rmse[2], rmse[1], 1e-6) << "stamps and calibration say it alike";
 }
 
 TEST(Tracker, StartsAtTheConfiguredPoseAndSaysHowSureItIs) {

@@ -37,6 +37,20 @@ TEST(EstimateRecorder, OnlineTrajectoryIsWhatWasPublished) {
   EXPECT_EQ(trajectory[1].T_world_camera.translation().x(), 103);
 }
 
+TEST(EstimateRecorder, ResidualsAreThoseOfTrackedFrames) {
+  EstimateRecorder recorder(4);
+  EXPECT_EQ(recorder.residual_variance(), 0.0);
+  PoseEstimate pose = estimate(0, TrackingState::Tracking, 1);
+  for (const double variance : {0.5, 1.0}) {
+    pose.residual_variance = variance;
+    recorder.record(pose);
+  }
+  pose.state = TrackingState::Lost;
+  pose.residual_variance = 7.0;
+  recorder.record(pose);
+  EXPECT_EQ(recorder.residual_variance(), 0.75);
+}
+
 TEST(EstimateRecorder, KeepsEveryFrameForTheTruth) {
   EstimateRecorder recorder(2);
   recorder.record(estimate(0, TrackingState::Lost, 0));

@@ -14,6 +14,7 @@ ReplayStats example() {
   stats.source = {"replay of \"desk\", 480 frames", 640, 480, 30.0, 480, 4};
   stats.lockstep = true;
   stats.wall_s = 16.5;
+  stats.residual_variance = 0.75;
   stats.health.frames_captured = 478;
   stats.health.frames_no_slot = 2;
   stats.health.frames_skipped = 3;
@@ -33,6 +34,7 @@ TEST(ReplayStats, JsonHoldsCountersAndQuantiles) {
   EXPECT_EQ(json.at("lost"), 4);
   EXPECT_EQ(json.at("dropped"), 6);
   EXPECT_EQ(json.at("skipped"), 3);
+  EXPECT_EQ(json.at("residual_variance"), 0.75);
   EXPECT_EQ(json.at("keyframes"), 12);
   EXPECT_EQ(json.at("pacing"), "lockstep");
   EXPECT_EQ(json.at("peak_rss_bytes"), 123'000'000);

@@ -38,6 +38,7 @@ TEST(FormatCamera, IsReadBackByTheLoader) {
   const TemporaryFolder folder;
   CameraIntrinsics camera = primesense_camera(640, 480);
   camera.k1 = -0.123456789012345;
+  camera.depth_delay_s = -0.016;
   const Result<CameraIntrinsics> read = load_camera(folder.write("camera.toml", format_camera(camera, "Two\nlines.")));
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->width, 640);
@@ -45,6 +46,7 @@ TEST(FormatCamera, IsReadBackByTheLoader) {
   EXPECT_EQ(read->cy, camera.cy);
   EXPECT_EQ(read->k1, camera.k1);
   EXPECT_EQ(read->baseline_fx, camera.baseline_fx);
+  EXPECT_EQ(read->depth_delay_s, camera.depth_delay_s);
 }
 
 TEST(SynthRecording, RefusesAFolderThatIsNotEmpty) {

@@ -41,6 +41,7 @@ TEST_F(LibcameraCameraTest, DeliversPairsOfOneInstant) {
       first_ns = frame->capture_ns;
     }
     EXPECT_EQ(frame->sequence, first + i);
+    EXPECT_NEAR(static_cast<double>(frame->depth_offset_ns), 0.0, 1e3) << "V4L2 tells microseconds";
     EXPECT_EQ(rig_.clock.now_ns() - frame->capture_ns, rig_.color.delay_ns) << "a completed image wakes the reader at once";
     EXPECT_EQ(frame->capture_ns, first_ns + static_cast<TimeNs>(i) * from_seconds(1.0 / 30)) << "the colour image's stamp";
     for (int y = 0; y < LibcameraRig::kHeight; ++y) {
@@ -54,6 +55,21 @@ TEST_F(LibcameraCameraTest, DeliversPairsOfOneInstant) {
   EXPECT_EQ(camera->metrics().unpaired.value(), 0U);
   EXPECT_EQ(camera->metrics().clock_resets.value(), 0U);
   EXPECT_EQ(rig_.color.queued(), rig_.color.buffers);
+}
+
+TEST_F(LibcameraCameraTest, SaysHowMuchLaterTheDepthImageWasTaken) {
+  rig_.depth->phase_ns = 5 * kNsPerMs;
+  const auto camera = rig_.camera();
+  ASSERT_TRUE(camera->open());
+  for (int delivered = 0; delivered < 10;) {
+    FrameWriter frame = slot();
+    const CameraRead got = rig_.read(*camera, &*frame);
+    ASSERT_TRUE(got.kind == CameraReadKind::Frame || got.kind == CameraReadKind::Nothing);
+    if (got.kind == CameraReadKind::Frame) {
+      EXPECT_NEAR(static_cast<double>(frame->depth_offset_ns), 5e6, 1e3);
+      ++delivered;
+    }
+  }
 }
 
 TEST_F(LibcameraCameraTest, WaitsNoLongerThanAsked) {

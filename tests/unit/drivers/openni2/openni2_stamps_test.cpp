@@ -31,6 +31,7 @@ TEST_F(OpenNi2StampsTest, PairsByStampsNotByIndices) {
   EXPECT_EQ((&capture.frame->bgr.at(3, 4))[1], test_color(3, 4, 1, 5));
   EXPECT_FLOAT_EQ(capture.frame->depth_m.at(3, 4), static_cast<float>(test_depth(3, 4, 8)) / 1000.0F);
   EXPECT_EQ(running.health().unpaired, 0U);
+  EXPECT_EQ(capture.frame->depth_offset_ns, 10 * kNsPerMs);
 }
 
 TEST_F(OpenNi2StampsTest, LeavesOutAndCountsWhatHasNoPartner) {
