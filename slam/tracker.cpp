@@ -354,8 +354,7 @@ PoseEstimate Tracker::Impl::track(const RgbdFrame& rgbd, const MapSnapshot& map,
   timing.mask_ns = masked_ns - begin_ns;
   wary = false;
   extract(rgbd);
-  const TimeNs extracted_ns = now_ns();
-  timing.extract_ns = extracted_ns - masked_ns;
+  timing.extract_ns = now_ns() - masked_ns;
   ++frames_since_keyframe;
   starts_map = false;
   T_map_odom = map.T_map_odom;
