@@ -30,8 +30,13 @@ float follow(const PinholeCamera& camera, ImageView<const float> depth_m, const 
     if (p.z() <= 0) {
       return 0.0F;
     }
-    const Eigen::Vector2f pixel = camera.distort(camera.project(p)).cast<float>();
-    const float seen = depth_at(depth_m, pixel.x(), pixel.y());
+    const Eigen::Vector2d pixel = camera.distort(camera.project(p));
+    const bool in_image =
+        pixel.x() > -0.5 && pixel.x() < depth_m.width - 0.5 && pixel.y() > -0.5 && pixel.y() < depth_m.height - 0.5;
+    if (!in_image) {
+      return 0.0F;
+    }
+    const float seen = depth_at(depth_m, static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
     const float change = seen - static_cast<float>(p.z());
     if (std::abs(change) > kSameSurface * seen) {
       return 0.0F;

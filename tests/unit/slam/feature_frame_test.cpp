@@ -106,6 +106,18 @@ TEST_F(FeatureFrameTest, WhereTheSurfaceIsLostBetweenTheImagesThereIsNoDepth) {
   EXPECT_NEAR(frame.depth_m()[1], 2.0F, 1e-5F);
 }
 
+TEST_F(FeatureFrameTest, WhatTheOtherImageDidNotShowHasNoDepth) {
+  add(30, 240);
+  add(320, 250);
+  frame.place(camera, depth_view, Se3(Eigen::Quaterniond::Identity(), {-0.3, 0, 0}));  // 78 pixels at 2 m
+  EXPECT_EQ(frame.depth_m()[0], 0.0F);
+  EXPECT_NEAR(frame.depth_m()[1], 2.0F, 1e-5F);
+  for (const Eigen::Vector3d& leap : {Eigen::Vector3d(1e9, 0, 0), Eigen::Vector3d(0, 0, -2), Eigen::Vector3d(0, 0, 1e30)}) {
+    frame.place(camera, depth_view, Se3(Eigen::Quaterniond::Identity(), leap));
+    EXPECT_EQ(frame.depth_m()[1], 0.0F) << "as of a velocity that cannot be";
+  }
+}
+
 TEST_F(FeatureFrameTest, TreatsMissingAndBrokenDepthAsNone) {
   for (const float broken : {0.0F, -1.0F, std::nanf(""), INFINITY}) {
     depth[0] = broken;
