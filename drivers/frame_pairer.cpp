@@ -46,6 +46,12 @@ std::optional<std::size_t> FramePairer::partner_of(const UnpairedImage& image, P
   return next_is_nearer ? std::nullopt : nearest;
 }
 
+void FramePairer::Outcome::stamp(RgbdFrame& frame, PairSide counted) const {
+  frame.capture_ns = color.capture_ns;
+  frame.depth_offset_ns = depth.capture_ns - color.capture_ns;
+  frame.sequence = counted == PairSide::Depth ? depth.sequence : color.sequence;
+}
+
 FramePairer::Outcome FramePairer::add(PairSide side, const UnpairedImage& image) {
   Outcome outcome;
   Queue& own = waiting_[index_of(side)];

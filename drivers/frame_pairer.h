@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/clock.h"
+#include "core/rgbd_frame.h"
 
 namespace posed {
 
@@ -43,6 +44,9 @@ class FramePairer {
     std::array<Discarded, 2 * kMost> let_go;  ///< for want of a partner; to be given back to their owners
     std::size_t let_go_count = 0;
     std::span<const Discarded> discarded() const { return {let_go.data(), let_go_count}; }
+
+    /// Writes when a pair's images were taken, and as `sequence` what the `counted` side counts.
+    void stamp(RgbdFrame& frame, PairSide counted) const;
   };
 
   explicit FramePairer(const FramePairerOptions& options) : options_(options) {}

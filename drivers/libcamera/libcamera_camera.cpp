@@ -171,9 +171,7 @@ CameraRead LibcameraCamera::deliver(const FramePairer::Outcome& pair, RgbdFrame*
     written = write_color(color_->format(), color_->planes(buffer), bytes_used_[buffer], mjpeg_, *frame);
     if (written) {
       depth_.write_depth(depth_.stream().image_in(pair.depth.buffer), frame->depth_m);
-      frame->capture_ns = pair.color.capture_ns;
-      frame->depth_offset_ns = pair.depth.capture_ns - pair.color.capture_ns;
-      frame->sequence = counted_ == PairSide::Depth ? pair.depth.sequence : pair.color.sequence;
+      pair.stamp(*frame, counted_);
     }
   }
   give_back(PairSide::Color, pair.color.buffer);

@@ -97,9 +97,7 @@ CameraRead V4l2Camera::deliver(const FramePairer::Outcome& pair, RgbdFrame* fram
     written = color_.write_color(color_.stream().image_in(pair.color.buffer), *frame);
     if (written) {
       depth_.write_depth(depth_.stream().image_in(pair.depth.buffer), frame->depth_m);
-      frame->capture_ns = pair.color.capture_ns;
-      frame->depth_offset_ns = pair.depth.capture_ns - pair.color.capture_ns;
-      frame->sequence = counted_ == PairSide::Depth ? pair.depth.sequence : pair.color.sequence;
+      pair.stamp(*frame, counted_);
     }
   }
   color_.stream().give_back(pair.color.buffer);
