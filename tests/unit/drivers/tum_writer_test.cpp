@@ -12,6 +12,17 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
+/// A writer of an empty folder, and one frame to give to it.
+class TumWriterFrames : public testing::Test {
+ protected:
+  void SetUp() override { ASSERT_TRUE(writer_); }
+
+  TemporaryFolder folder_;
+  Result<TumWriter> writer_ = TumWriter::create(folder_.path(), {});
+  FramePool pool_{kTestWidth, kTestHeight, 1};
+  FrameWriter frame_ = *pool_.acquire();
+};
+
 TEST(TumWriter, WritesTheLayout) {
   const TemporaryFolder folder;
   write_recording(folder.path() / "new" / "recording", 2, ColorFormat::Jpeg);
@@ -25,19 +36,14 @@ TEST(TumWriter, WritesTheLayout) {
   EXPECT_FALSE(std::filesystem::exists(root / "groundtruth.txt")) << "these frames carry no true pose";
 }
 
-TEST(TumWriter, GroundTruthStandsWhereFramesCarryIt) {
-  const TemporaryFolder folder;
-  Result<TumWriter> writer = TumWriter::create(folder.path(), {});
-  ASSERT_TRUE(writer);
-  FramePool pool(kTestWidth, kTestHeight, 1);
-  FrameWriter frame = *pool.acquire();
-  paint(*frame, 0);
-  frame->stamp_utc_ns = 1'500'000'000;
-  frame->T_world_camera_truth = Se3(Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0), {1.0, -2.0, 0.125});
-  ASSERT_TRUE(writer->add_frame(*frame));
-  EXPECT_FALSE(std::filesystem::exists(folder.path() / "rgb.txt")) << "no list before it is committed";
-  ASSERT_TRUE(writer->commit());
-  EXPECT_EQ(text_of(folder.path() / "groundtruth.txt"),
+TEST_F(TumWriterFrames, GroundTruthStandsWhereFramesCarryIt) {
+  paint(*frame_, 0);
+  frame_->stamp_utc_ns = 1'500'000'000;
+  frame_->T_world_camera_truth = Se3(Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0), {1.0, -2.0, 0.125});
+  ASSERT_TRUE(writer_->add_frame(*frame_));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "rgb.txt")) << "no list before it is committed";
+  ASSERT_TRUE(writer_->commit());
+  EXPECT_EQ(text_of(folder_.path() / "groundtruth.txt"),
             "# ground truth trajectory\n# timestamp tx ty tz qx qy qz qw\n"
             "1.500000000 1.000000000 -2.000000000 0.125000000 1.000000000 0.000000000 0.000000000 0.000000000\n");
 }
@@ -55,23 +61,18 @@ TEST(TumWriter, WhatItWritesPairsExactly) {
   EXPECT_EQ(sequence->period_ns, kTestPeriodNs);
 }
 
-TEST(TumWriter, DepthKeepsItsOwnTime) {
-  const TemporaryFolder folder;
-  Result<TumWriter> writer = TumWriter::create(folder.path(), {});
-  ASSERT_TRUE(writer);
-  FramePool pool(kTestWidth, kTestHeight, 1);
-  FrameWriter frame = *pool.acquire();
+TEST_F(TumWriterFrames, DepthKeepsItsOwnTime) {
   // The third frame has the depth image of the second: a list has no stamp twice, so it is a nanosecond later.
   const std::vector<TimeNs> offsets{-7 * kNsPerMs, 16 * kNsPerMs, 16 * kNsPerMs - kTestPeriodNs};
   for (std::size_t i = 0; i < offsets.size(); ++i) {
-    paint(*frame, static_cast<int>(i));
-    frame->stamp_utc_ns = kTestStampNs + static_cast<TimeNs>(i) * kTestPeriodNs;
-    frame->depth_offset_ns = offsets[i];
-    ASSERT_TRUE(writer->add_frame(*frame));
+    paint(*frame_, static_cast<int>(i));
+    frame_->stamp_utc_ns = kTestStampNs + static_cast<TimeNs>(i) * kTestPeriodNs;
+    frame_->depth_offset_ns = offsets[i];
+    ASSERT_TRUE(writer_->add_frame(*frame_));
   }
-  ASSERT_TRUE(writer->commit());
+  ASSERT_TRUE(writer_->commit());
   ReplayConfig config;
-  config.sequence = folder.path().string();
+  config.sequence = folder_.path().string();
   const Result<TumSequence> sequence = load_tum_sequence(config);
   ASSERT_TRUE(sequence) << sequence.error().message;
   ASSERT_EQ(sequence->pairs.size(), 3U);
@@ -90,15 +91,10 @@ TEST(TumWriter, NeverWritesIntoARecording) {
   EXPECT_THAT(writer.error().message, HasSubstr("holds a recording already"));
 }
 
-TEST(TumWriter, StampsMustGrow) {
-  const TemporaryFolder folder;
-  Result<TumWriter> writer = TumWriter::create(folder.path(), {});
-  ASSERT_TRUE(writer);
-  FramePool pool(kTestWidth, kTestHeight, 1);
-  FrameWriter frame = *pool.acquire();
-  frame->stamp_utc_ns = 10;
-  ASSERT_TRUE(writer->add_frame(*frame));
-  EXPECT_FALSE(writer->add_frame(*frame));
+TEST_F(TumWriterFrames, StampsMustGrow) {
+  frame_->stamp_utc_ns = 10;
+  ASSERT_TRUE(writer_->add_frame(*frame_));
+  EXPECT_FALSE(writer_->add_frame(*frame_));
 }
 
 TEST(TumWriter, AFolderThatCannotBeMadeIsNamed) {

@@ -26,6 +26,11 @@ bool well_inside(ImageView<const std::uint8_t> mask, const Keypoint& keypoint) {
   return true;
 }
 
+std::size_t count_inside(ImageView<const std::uint8_t> mask, const std::vector<Keypoint>& keypoints) {
+  return static_cast<std::size_t>(
+      std::count_if(keypoints.begin(), keypoints.end(), [&](const Keypoint& k) { return well_inside(mask, k); }));
+}
+
 struct Walk {
   double rmse_m = 0;
   double share_on_person = 0;           ///< of the features that count for the pose, frames with a person
@@ -65,14 +70,12 @@ Walk walk(DynamicMode mode) {
     if (covered > 0) {
       const auto& keypoints = rig.tracker().last_features().features().keypoints;
       kept += keypoints.size();
-      on_person += static_cast<std::size_t>(
-          std::count_if(keypoints.begin(), keypoints.end(), [&](const Keypoint& k) { return well_inside(mask, k); }));
+      on_person += count_inside(mask, keypoints);
     }
     if (estimate.keyframe) {
       const auto& keypoints = rig.record().features.keypoints;
       in_keyframes += keypoints.size();
-      in_keyframes_on_person += static_cast<std::size_t>(
-          std::count_if(keypoints.begin(), keypoints.end(), [&](const Keypoint& k) { return well_inside(mask, k); }));
+      in_keyframes_on_person += count_inside(mask, keypoints);
     }
   }
   result.rmse_m = std::sqrt(squared / kFrames);
