@@ -245,9 +245,8 @@ Schema camera_schema(CameraIntrinsics& k) {
            "depth against pixels in the pose: the depth sensor's own baseline is the natural choice.")
       .required()
       .key("depth_delay_s", real(k.depth_delay_s, -0.2, 0.2), "s",
-           "How much later than the colour image of the same stamp a depth image was taken; negative: earlier. What the two stamps "
-           "of a "
-           "frame differ by is known without it. The right value is the one with the least `residual_variance` "
+           "How much later than the colour image of the same stamp a depth image was taken; negative: earlier. What the two "
+           "stamps of a frame differ by is known without it. The right value is the one with the least `residual_variance` "
            "(`posectl replay --stats`) of a recording with quick motion.");
   return std::move(schema).build();
 }
