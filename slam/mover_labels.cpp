@@ -8,7 +8,8 @@
 
 namespace posed {
 
-MoverCarrier::MoverCarrier(const PinholeCamera& camera) : camera_(camera) {
+MoverCarrier::MoverCarrier(const PinholeCamera& camera)
+    : camera_(camera), holes_(DepthGrid(camera.intrinsics().width, camera.intrinsics().height).size()) {
   const DepthGrid grid(camera.intrinsics().width, camera.intrinsics().height);
   front_.reserve(grid.size());
   next_front_.reserve(grid.size());
@@ -35,7 +36,7 @@ void MoverCarrier::carry(const DepthGrid& from, std::span<const std::uint8_t> la
   }
   close_seams(to, labels_to);
   grow(to, reach, labels_to);
-  fill_holes(to, labels_to);
+  holes_.fill(to, labels_to);
 }
 
 /// A surface that comes nearer leaves lines of cells out between those it is carried to.
@@ -79,21 +80,49 @@ void MoverCarrier::grow(const DepthGrid& to, const MoverReach& reach, std::span<
   }
 }
 
-void fill_holes(const DepthGrid& depth, std::span<std::uint8_t> labels) {
+void HoleFiller::fill(const DepthGrid& depth, std::span<std::uint8_t> labels) {
   constexpr int kLeastAround = 4;
-  for (std::size_t cell = 0; cell < labels.size(); ++cell) {
-    if (labels[cell] != 0 || depth[cell] > 0) {
+  std::fill(seen_.begin(), seen_.end(), std::uint8_t{0});
+  for (std::size_t first = 0; first < labels.size(); ++first) {
+    if (seen_[first] != 0 || labels[first] != 0 || depth[first] > 0) {
       continue;
     }
-    int around = 0;
+    hole_.assign(1, static_cast<std::uint32_t>(first));
+    seen_[first] = 1;
+    std::size_t border = 0;
+    std::size_t movers = 0;
     std::uint8_t label = 0;
-    depth.for_each_around(cell, [&](std::size_t c) {
-      if (labels[c] != 0) {
-        ++around;
-        label = std::max(label, labels[c]);
+    for (std::size_t next = 0; next < hole_.size(); ++next) {
+      depth.for_each_beside(hole_[next], [&](std::size_t to) {
+        if (labels[to] == 0 && depth[to] <= 0) {
+          if (seen_[to] == 0) {
+            seen_[to] = 1;
+            hole_.push_back(static_cast<std::uint32_t>(to));
+          }
+          return;
+        }
+        ++border;
+        movers += labels[to] != 0 ? 1 : 0;
+        label = std::max(label, labels[to]);
+      });
+    }
+    if (2 * movers >= border && movers > 0) {
+      for (const std::uint32_t cell : hole_) {
+        labels[cell] = label;
       }
-    });
-    labels[cell] = around >= kLeastAround ? label : std::uint8_t{0};
+      continue;
+    }
+    std::size_t count = 0;  // of the hole's cells that are filled; they move to its front, and get their label once all are known
+    for (std::size_t i = 0; i < hole_.size() && movers > 0; ++i) {
+      int around = 0;
+      depth.for_each_around(hole_[i], [&](std::size_t c) { around += labels[c] != 0 ? 1 : 0; });
+      if (around >= kLeastAround) {
+        std::swap(hole_[count++], hole_[i]);
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      labels[hole_[i]] = label;
+    }
   }
 }
 

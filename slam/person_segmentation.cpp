@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "slam/background_plane.h"
 #include "slam/surface.h"
 
 namespace posed {
@@ -16,14 +17,22 @@ constexpr float kOneSurface_m = 0.25F;       // clusters nearer to each other th
 constexpr float kLeastShare = 0.25F;         // of the box's weight, that the nearest cluster must have to be the person
 constexpr float kBodyDepth_m = 0.45F;        // half of it: how far a body reaches from its middle, arms included
 constexpr float kGrowMargin = 0.12F;         // of the box's sides, how far a person may reach beyond it
-constexpr std::size_t kLeastPieceShare = 8;  // a piece of less than one part in so many of the largest one is not the person's
+constexpr int kPlanes = 2;                   // around a box: a desk and a wall
+constexpr float kAroundMargin = 0.5F;        // of the box's sides, where they are looked for
+constexpr float kLeastPlaneShare = 0.2F;     // of the cells there, that a plane must hold
+constexpr std::size_t kLeastAround = 60;     // [cells]
+constexpr int kWidestGap = 6;                // [cells] where a plane cuts through a person
+constexpr float kLeastPieceShare = 0.2F;     // a piece of less weight than this share of the largest one's is not the person's
 
 }  // namespace
 
-PersonSegmentation::PersonSegmentation(int image_width, int image_height) {
-  const DepthGrid grid(image_width, image_height);
+PersonSegmentation::PersonSegmentation(const PinholeCamera& camera) : camera_(camera) {
+  const DepthGrid grid(camera.intrinsics().width, camera.intrinsics().height);
   columns_ = grid.columns();
   rows_ = grid.rows();
+  around_.reserve(grid.size());
+  is_background_.resize(grid.size());
+  weights_.resize(grid.size());
   samples_.reserve(grid.size());
   seen_.resize(grid.size());
   queue_.reserve(grid.size());
@@ -38,17 +47,51 @@ PersonSegmentation::Range PersonSegmentation::cells_of(const BoundingBox& box, f
   return {cell(box.x_min - dx, columns_), cell(box.y_min - dy, rows_), cell(box.x_max + dx, columns_), cell(box.y_max + dy, rows_)};
 }
 
+/// What lies on a plane that is large around the box too, is no person: without this, one who leans over a desk would be as large as it.
+void PersonSegmentation::find_background(const DepthGrid& depth, const BoundingBox& box) {
+  const Range inner = cells_of(box, kGrowMargin);
+  const Range outer = cells_of(box, kAroundMargin);
+  std::fill(is_background_.begin(), is_background_.end(), std::uint8_t{0});
+  const auto for_each_outer = [&](auto&& visit) {
+    for (int y = outer.y0; y <= outer.y1; ++y) {
+      for (int x = outer.x0; x <= outer.x1; ++x) {
+        if (const std::size_t cell = depth.cell(x, y); depth[cell] > 0 && is_background_[cell] == 0) {
+          visit(cell, x >= inner.x0 && x <= inner.x1 && y >= inner.y0 && y <= inner.y1);
+        }
+      }
+    }
+  };
+  for (int i = 0; i < kPlanes; ++i) {
+    around_.clear();
+    for_each_outer([&](std::size_t cell, bool is_inner) {
+      if (!is_inner) {
+        around_.push_back(camera_.point(cell, depth[cell]));
+      }
+    });
+    if (around_.size() < kLeastAround) {
+      return;
+    }
+    const std::optional<Plane> plane = find_plane(around_, kLeastPlaneShare);
+    if (!plane) {
+      return;
+    }
+    for_each_outer([&](std::size_t cell, bool) { is_background_[cell] = plane->holds(camera_.point(cell, depth[cell])) ? 1 : 0; });
+  }
+}
+
 void PersonSegmentation::collect(const DepthGrid& depth, const Range& range) {
   samples_.clear();
+  std::fill(weights_.begin(), weights_.end(), 0.0F);
   const float half_width = 0.5F * static_cast<float>(range.x1 - range.x0 + 1);
   const float half_height = 0.5F * static_cast<float>(range.y1 - range.y0 + 1);
   for (int y = range.y0; y <= range.y1; ++y) {
     for (int x = range.x0; x <= range.x1; ++x) {
       const std::size_t cell = depth.cell(x, y);
-      if (depth[cell] > 0) {
+      if (depth[cell] > 0 && is_background_[cell] == 0) {
         const float off_x = std::abs(static_cast<float>(x - range.x0) + 0.5F - half_width) / half_width;
         const float off_y = std::abs(static_cast<float>(y - range.y0) + 0.5F - half_height) / half_height;
-        samples_.push_back({static_cast<std::uint32_t>(cell), depth[cell], (1.05F - off_x) * (1.25F - off_y)});
+        weights_[cell] = (1.05F - off_x) * (1.25F - off_y);
+        samples_.push_back({static_cast<std::uint32_t>(cell), depth[cell], weights_[cell]});
       }
     }
   }
@@ -107,11 +150,56 @@ PersonSegmentation::Cluster PersonSegmentation::person_cluster() const {
                                                         [](const Cluster& a, const Cluster& b) { return a.weight < b.weight; });
 }
 
+/// Where a plane cuts through the person, the cells on it are theirs: those with the person on both sides of a short gap.
+void PersonSegmentation::close_over_planes(const DepthGrid& depth, const Range& range, std::vector<std::uint32_t>& cells) {
+  std::fill(seen_.begin(), seen_.end(), std::uint8_t{0});
+  for (const std::uint32_t cell : cells) {
+    seen_[cell] = 1;
+  }
+  const auto bridge = [&](int x, int y, int dx, int dy) {
+    std::size_t before = depth.cell(x, y);
+    for (int gap = 1; gap <= kWidestGap + 1; ++gap) {
+      x += dx;
+      y += dy;
+      if (x > range.x1 || y > range.y1) {
+        return;
+      }
+      const std::size_t cell = depth.cell(x, y);
+      if (!is_one_surface(depth[before], depth[cell])) {
+        return;
+      }
+      if (seen_[cell] == 1) {
+        for (int back = 1; back < gap; ++back) {
+          const std::size_t between = depth.cell(x - back * dx, y - back * dy);
+          if (seen_[between] == 0) {
+            seen_[between] = 2;  // no end of another gap
+            cells.push_back(static_cast<std::uint32_t>(between));
+          }
+        }
+        return;
+      }
+      if (is_background_[cell] == 0) {
+        return;
+      }
+      before = cell;
+    }
+  };
+  for (int y = range.y0; y <= range.y1; ++y) {
+    for (int x = range.x0; x <= range.x1; ++x) {
+      if (seen_[depth.cell(x, y)] == 1) {
+        bridge(x, y, 1, 0);
+        bridge(x, y, 0, 1);
+      }
+    }
+  }
+}
+
 void PersonSegmentation::grow(const DepthGrid& depth, const Range& range, const Cluster& person,
                               std::vector<std::uint32_t>& cells) {
   std::fill(seen_.begin(), seen_.end(), std::uint8_t{0});
   const float seed_reach_m = std::clamp(2.0F * person.deviation_m, 0.15F, kBodyDepth_m);
-  std::size_t largest = 0;
+  float largest = 0;
+  float kept = 0;
   for (const Sample& seed : samples_) {
     if (seen_[seed.cell] != 0 || std::abs(seed.depth_m - person.depth_m) > seed_reach_m) {
       continue;
@@ -123,27 +211,35 @@ void PersonSegmentation::grow(const DepthGrid& depth, const Range& range, const 
       depth.for_each_beside(from, [&](std::size_t to) {
         const int x = static_cast<int>(to) % columns_;
         const int y = static_cast<int>(to) / columns_;
-        if (seen_[to] == 0 && x >= range.x0 && x <= range.x1 && y >= range.y0 && y <= range.y1 &&
+        if (seen_[to] == 0 && is_background_[to] == 0 && x >= range.x0 && x <= range.x1 && y >= range.y0 && y <= range.y1 &&
             std::abs(depth[to] - person.depth_m) < kBodyDepth_m && is_one_surface(depth[from], depth[to])) {
           seen_[to] = 1;
           queue_.push_back(static_cast<std::uint32_t>(to));
         }
       });
     }
-    if (kLeastPieceShare * queue_.size() < largest) {
+    float weight = 0;
+    for (const std::uint32_t cell : queue_) {
+      weight += weights_[cell];
+    }
+    if (weight < kLeastPieceShare * largest) {
       continue;
     }
-    if (kLeastPieceShare * cells.size() < queue_.size()) {
+    if (kept < kLeastPieceShare * weight) {
       cells.clear();  // what was found before is crumbs beside this
+      kept = 0;
     }
-    largest = std::max(largest, queue_.size());
+    largest = std::max(largest, weight);
+    kept += weight;
     cells.insert(cells.end(), queue_.begin(), queue_.end());
   }
+  close_over_planes(depth, range, cells);
   std::sort(cells.begin(), cells.end());
 }
 
 void PersonSegmentation::segment(const DepthGrid& depth, const BoundingBox& box, std::vector<std::uint32_t>& cells) {
   cells.clear();
+  find_background(depth, box);
   collect(depth, cells_of(box, 0));
   if (samples_.empty()) {
     return;
