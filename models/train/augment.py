@@ -172,15 +172,15 @@ def occlude(image: np.ndarray, boxes: np.ndarray, other: Sample, options: Augmen
     return image
 
 
-def augmented(samples: list[Sample], index: int, width: int, height: int, options: Augmentation, rng: np.random.Generator):
-    """One training image (H x W x 3, 8 bit, blue, green, red), its labels and boxes."""
+def augmented(sample: Sample, samples: list[Sample], width: int, height: int, options: Augmentation, rng: np.random.Generator):
+    """One training image (H x W x 3, 8 bit, blue, green, red) of the sample, others beside it in a mosaic; its labels and boxes."""
     canvas = np.full((height, width, 3), 114, np.uint8)
     if rng.random() < options.mosaic:
         x, y = int(rng.uniform(0.3, 0.7) * width), int(rng.uniform(0.3, 0.7) * height)
         areas = [(0, 0, x, y), (x, 0, width, y), (0, y, x, height), (x, y, width, height)]
-        chosen = [samples[index]] + [samples[i] for i in rng.integers(len(samples), size=3)]
+        chosen = [sample] + [samples[i] for i in rng.integers(len(samples), size=3)]
     else:
-        areas, chosen = [(0, 0, width, height)], [samples[index]]
+        areas, chosen = [(0, 0, width, height)], [sample]
     chosen = [turned(s, rng.random() < 0.5) if rng.random() < options.quarter_turn else s for s in chosen]
     parts = [place(canvas, area, sample, crop_window(sample, options, rng), options) for area, sample in zip(areas, chosen)]
     labels, boxes = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])

@@ -12,6 +12,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+import fused_norm
+
 STRIDES_4 = (4, 8, 16, 32)
 STRIDES_3 = (8, 16, 32)
 ANCHORS_PER_LAYER = 3
@@ -56,7 +58,10 @@ class Conv(nn.Module):
         self.act = Silu(inplace=True) if act else nn.Identity()
 
     def forward(self, x: Tensor) -> Tensor:
-        return self.act(self.bn(self.conv(x)))
+        x = self.conv(x)
+        if self.training and fused_norm.is_for(x):
+            return fused_norm.normalised(x, self.bn, isinstance(self.act, Silu))
+        return self.act(self.bn(x))
 
 
 class Bottleneck(nn.Module):

@@ -15,12 +15,15 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+import fused_norm
 from anchors import fit_anchors
 from augment import AUGMENTATIONS, Augmentation, augmented
+from composites import Compositor, read_cut_outs
 from dataset import DataError, Sample, letterbox, read_folder
 from loss import DetectionLoss
 from metrics import AveragePrecision, decode, suppress
 from network import ANCHORS_PER_LAYER, NetworkOptions, Yolo, parameter_count
+from team import Team, fork_team
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,7 @@ class Settings:
     ema_half_life_steps: int = 300
     close_mosaic: float = 0.85  # share of the training after which there are no mosaics
     augmentation: str = "general"  # of augment.AUGMENTATIONS
+    composites: float = 0.4  # share of images that are composites, where there are cut-outs
 
 
 PRESETS = {
@@ -67,15 +71,17 @@ class MovingAverage:
 
 
 class Batches(torch.utils.data.Dataset):
-    """Batch number `step` is a function of the seed and the step alone, so that a resumed run sees what it would have seen.
+    """The batch of a step is a function of the seed, the step and the place in the team alone, so that a resumed run sees what it would
+    have seen.
 
     (With a time budget, the step from which there are no mosaics depends on the time that was taken.) `late` is shared with the processes
     that make batches: how near the end of a run that goes by time is, cannot be told from the number of steps.
     """
 
-    def __init__(self, samples: list[Sample], settings: Settings, augmentation: Augmentation, seed: int, steps: int, first: int):
-        self.samples, self.settings, self.augmentation = samples, settings, augmentation
-        self.seed, self.steps, self.first = seed, steps, first
+    def __init__(self, samples: list[Sample], settings: Settings, augmentation: Augmentation, seed: int, steps: int, first: int,
+                 compositor: Compositor | None = None, team: Team = Team()):
+        self.samples, self.settings, self.augmentation, self.compositor = samples, settings, augmentation, compositor
+        self.seed, self.steps, self.first, self.team = seed, steps, first, team
         self.late = torch.zeros(1, dtype=torch.bool).share_memory_()
 
     def __len__(self) -> int:
@@ -84,15 +90,18 @@ class Batches(torch.utils.data.Dataset):
     def __getitem__(self, offset: int) -> tuple[Tensor, Tensor]:
         step = self.first + offset
         s = self.settings
+        number = step * self.team.size + self.team.rank
         per_epoch = max(len(self.samples) // s.batch, 1)
-        order = np.random.default_rng((self.seed, step // per_epoch)).permutation(len(self.samples))
-        rng = np.random.default_rng((self.seed, 1, step))
+        order = np.random.default_rng((self.seed, number // per_epoch)).permutation(len(self.samples))
+        rng = np.random.default_rng((self.seed, 1, number))
         mosaics = step < s.close_mosaic * self.steps and not self.late
         options = self.augmentation if mosaics else replace(self.augmentation, mosaic=0.0)
         images, targets = [], []
         for i in range(s.batch):
-            index = order[(step % per_epoch * s.batch + i) % len(order)]
-            image, labels, boxes = augmented(self.samples, index, s.width_px, s.height_px, options, rng)
+            sample = self.samples[order[(number % per_epoch * s.batch + i) % len(order)]]
+            if self.compositor and rng.random() < s.composites:
+                sample = self.compositor.sample(rng)
+            image, labels, boxes = augmented(sample, self.samples, s.width_px, s.height_px, options, rng)
             images.append(torch.from_numpy(image[:, :, ::-1].copy()).permute(2, 0, 1))
             for label, (x0, y0, x1, y1) in zip(labels, boxes):
                 targets.append([i, label, (x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0])
@@ -164,6 +173,7 @@ class Training:
             width=args.width, ghost=not args.no_ghost, cbam=not args.no_cbam, fourth_layer=not args.no_fourth_layer)
         self.samples = [s for folder in args.data for s in read_folder(folder, options.classes, args.longest_side)]
         self.valid = read_folder(args.valid, options.classes) if args.valid else []
+        self.compositor = self.read_compositor() if args.cut_outs else None
         self.device = torch.device(args.device)
         self.network = Yolo(options)
         self.anchors = np.array(saved["anchors"]) if saved else fitted_anchors(self.samples, self.settings, len(options.strides), args.seed)
@@ -178,13 +188,23 @@ class Training:
         self.optimizer = make_optimizer(self.network, self.settings)
         self.loss = DetectionLoss(torch.tensor(self.anchors), options.strides, options.classes).to(self.device)
         self.step, self.seconds = 0, 0.0
+        self.before = self.begun = 0.0  # seconds of earlier sessions, and when this one began
         if saved:
             self.ema.network.load_state_dict(saved["ema"])
             self.optimizer.load_state_dict(saved["optimizer"])
             self.step, self.seconds = saved["step"], saved["seconds"]
-        self.steps = self.settings.epochs * max(len(self.samples) // self.settings.batch, 1)
+        self.team = Team()
+        self.steps = self.settings.epochs * max(len(self.samples) // (self.settings.batch * args.processes), 1)
         print(f"{parameter_count(self.network):,} parameters, {len(self.samples)} images, steps {self.step} to {self.steps}, "
               f"anchors {self.anchors.tolist()}", flush=True)
+
+    def read_compositor(self) -> Compositor:
+        people = [c for folder in self.args.cut_outs for c in read_cut_outs(folder)]
+        backgrounds = [s for s in self.samples if not len(s.boxes)]
+        if not people or not backgrounds:
+            raise DataError(f"composites need somebody who is cut out ({len(people)}) and images that show nobody ({len(backgrounds)})")
+        print(f"composites of {len(people)} people and {len(backgrounds)} backgrounds", flush=True)
+        return Compositor(people, backgrounds)
 
     def state(self) -> dict:
         return {"settings": vars(self.settings), "options": self.network.options.to_dict(), "anchors": self.anchors.tolist(),
@@ -205,6 +225,7 @@ class Training:
         total, parts = self.loss(heads, targets.to(self.device))
         self.optimizer.zero_grad(set_to_none=True)
         total.backward()
+        self.seconds = self.team.average(self.network.parameters(), self.before + time.monotonic() - self.begun)
         nn.utils.clip_grad_norm_(self.network.parameters(), 10.0)
         self.optimizer.step()
         self.ema.update(self.network, self.step)
@@ -215,7 +236,7 @@ class Training:
         ap = None
         if self.valid:
             ap = average_precision(copy.deepcopy(self.ema.network).cpu(), self.valid, *self.args.valid_size, self.anchors).value()
-        row = {"step": self.step, "epoch": round(self.step * self.settings.batch / len(self.samples), 2), "seconds": round(self.seconds),
+        row = {"step": self.step, "epoch": round(self.step * self.settings.batch * self.team.size / len(self.samples), 2), "seconds": round(self.seconds),
                **{k: round(v / max(count, 1), 5) for k, v in sums.items()}, "ap50": "" if ap is None else round(ap, 4)}
         path = self.out / "log.csv"
         is_new = not path.exists()
@@ -229,13 +250,13 @@ class Training:
     def run(self, last_step: int | None = None) -> None:
         """To the end, or to `last_step`; whatever is left is done by another run from the checkpoint."""
         augmentation = AUGMENTATIONS[self.settings.augmentation]
-        batches = Batches(self.samples, self.settings, augmentation, self.args.seed, self.steps, self.step)
+        batches = Batches(self.samples, self.settings, augmentation, self.args.seed, self.steps, self.step, self.compositor, self.team)
         loader = torch.utils.data.DataLoader(batches, batch_size=None, shuffle=False, num_workers=self.args.workers,
                                              prefetch_factor=4 if self.args.workers else 2)
         sums: dict[str, float] = {}
         count = 0
-        begun = saved = reported = time.monotonic()
-        before = self.seconds
+        self.begun = saved = reported = time.monotonic()
+        self.before = self.seconds
         if self.progress() >= 1:
             print(f"done already, after {self.step} steps", flush=True)
             return
@@ -245,26 +266,28 @@ class Training:
                 sums[name] = sums.get(name, 0.0) + value
             count += 1
             now = time.monotonic()
-            self.seconds = before + now - begun
             batches.late[0] = self.progress() >= self.settings.close_mosaic
             done = self.progress() >= 1
-            if done or now - saved > 60 * self.args.save_min:
+            if self.team.leads and (done or now - saved > 60 * self.args.save_min):
                 save_checkpoint(self.checkpoint_path, self.state())
                 saved = now
-            if done or now - reported > 60 * self.args.report_min:
+            if self.team.leads and (done or now - reported > 60 * self.args.report_min):
                 self.report(sums, count)
                 sums, count, reported = {}, 0, time.monotonic()
             if done:
                 return
-            if self.step == last_step or (self.args.stop_after_min and now - begun > 60 * self.args.stop_after_min):
-                save_checkpoint(self.checkpoint_path, self.state())
-                print(f"stopped at step {self.step} of {self.steps}; the same command goes on from here", flush=True)
+            if self.step == last_step or (self.args.stop_after_min and self.seconds - self.before > 60 * self.args.stop_after_min):
+                if self.team.leads:
+                    save_checkpoint(self.checkpoint_path, self.state())
+                    print(f"stopped at step {self.step} of {self.steps}; the same command goes on from here", flush=True)
                 return
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
     parser.add_argument("--data", type=Path, nargs="+", required=True, help="folders of images and labels")
+    parser.add_argument("--cut-outs", type=Path, nargs="+", default=[],
+                        help="folders of people cut out (NAME.jpg, NAME_mask.png), for composites with the images of --data that show nobody")
     parser.add_argument("--valid", type=Path, help="folder to measure on; never trained on")
     parser.add_argument("--valid-size", type=int, nargs=2, default=(320, 320), metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--out", type=Path, required=True, help="folder of checkpoint.pt and log.csv; a run found there goes on")
@@ -280,8 +303,10 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--longest-side", type=int, default=480, help="larger images are shrunk to this when they are read [pixels]")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--processes", type=int, default=1, help="that train together, each with a batch of its own a step")
     parser.add_argument("--workers", type=int, default=1, help="processes that make batches")
     parser.add_argument("--bf16", action="store_true", help="convolutions in bfloat16: faster where the processor has it")
+    parser.add_argument("--fused", action="store_true", help="with --bf16 on a processor: normalisation and SiLU in one (needs g++)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--save-min", type=float, default=3.0, help="minutes between checkpoints")
     parser.add_argument("--report-min", type=float, default=10.0, help="minutes between reports")
@@ -294,8 +319,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def main() -> int:
     args = parse_arguments()
     torch.set_num_threads(args.threads)
+    if args.fused:
+        fused_norm.enable()
     try:
-        Training(args).run()
+        training = Training(args)
+        training.team = fork_team(args.processes)
+        training.run()
     except DataError as error:
         print(f"train.py: {error}")
         return 65

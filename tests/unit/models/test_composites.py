@@ -1,11 +1,12 @@
+import tempfile
 import unittest
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from dataset import Sample
-from make_composites import CutOut, background_of, composite, cut_out
+from composites import Compositor, CutOut, background_of, composite, cut_by_mask, cut_out, hide, ragged, read_cut_outs
+from dataset import DataError, Sample
 
 
 def photograph(box: list[int], others: list[list[int]] | None = None) -> Sample:
@@ -62,6 +63,91 @@ class Composites(unittest.TestCase):
         image = background_of(sample, 160, 120, np.random.default_rng(0))
         self.assertEqual(image.shape, (120, 160, 3))
         self.assertTrue((image == 77).all())
+
+
+def portrait(shoulders_at: int) -> tuple[np.ndarray, np.ndarray]:
+    """A head, and shoulders from that row on that reach both sides: image and mask."""
+    mask = np.zeros((300, 240), np.uint8)
+    cv2.circle(mask, (120, 90), 60, 255, -1)
+    cv2.rectangle(mask, (90, 120), (150, shoulders_at), 255, -1)
+    mask[shoulders_at:] = 255
+    image = np.full((300, 240, 3), 30, np.uint8)
+    image[mask > 0] = 200
+    return image, mask
+
+
+class CutOuts(unittest.TestCase):
+    def test_shoulders_that_the_image_cuts_at_its_sides_are_left(self):
+        person = cut_by_mask(*portrait(shoulders_at=220))
+        self.assertTrue(person.cut_below)
+        self.assertEqual(person.image.shape[:2], person.alpha.shape)
+        self.assertEqual(person.image.shape[:2], (190, 121))  # rows 30 to 219, the head's columns
+
+    def test_a_whole_person_stays_whole(self):
+        mask = np.zeros((300, 200), np.uint8)
+        cv2.ellipse(mask, (100, 150), (50, 120), 0, 0, 360, 255, -1)
+        person = cut_by_mask(np.full((300, 200, 3), 90, np.uint8), mask)
+        self.assertFalse(person.cut_below)
+        self.assertEqual(person.alpha.shape, (241, 101))
+
+    def test_of_several_people_the_largest_is_taken_and_specks_are_nobody(self):
+        mask = np.zeros((200, 400), np.uint8)
+        mask[40:80, 20:50] = 255
+        self.assertIsNone(cut_by_mask(np.zeros((200, 400, 3), np.uint8), mask))
+        mask[30:190, 200:290] = 255
+        self.assertEqual(cut_by_mask(np.zeros((200, 400, 3), np.uint8), mask).alpha.shape, (160, 90))
+
+    def test_large_photographs_are_shrunk(self):
+        mask = np.zeros((1200, 800), np.uint8)
+        mask[300:1200, 200:600] = 255
+        self.assertEqual(max(cut_by_mask(np.zeros((1200, 800, 3), np.uint8), mask).alpha.shape), 315)
+
+    def test_a_folder_is_read_by_its_masks(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            image, mask = portrait(220)
+            cv2.imwrite(str(folder / "a.jpg"), image)
+            cv2.imwrite(str(folder / "a_mask.png"), mask)
+            self.assertEqual(len(read_cut_outs(folder)), 1)
+            (folder / "b_mask.png").write_bytes((folder / "a_mask.png").read_bytes())
+            with self.assertRaisesRegex(DataError, "b.jpg: not an image"):
+                read_cut_outs(folder)
+        with self.assertRaisesRegex(DataError, "no such folder"):
+            read_cut_outs(Path("absent"))
+
+    def test_a_ragged_border_moves_by_pixels_only(self):
+        alpha = np.zeros((120, 100), np.float32)
+        alpha[20:100, 20:80] = 1
+        for seed in range(10):
+            torn = ragged(alpha, np.random.default_rng(seed))
+            self.assertTrue(torn[32:88, 32:68].all())
+            self.assertFalse(torn[:8].any() or torn[:, :8].any())
+            self.assertFalse(np.array_equal(torn, alpha))
+
+    def test_what_stands_before_people_hides_some_of_them_but_not_the_upper_part(self):
+        for seed in range(20):
+            cover = hide(np.ones((120, 160), np.float32), np.random.default_rng(seed))
+            self.assertTrue(cover[:30].all())
+            self.assertTrue(0 < (cover == 0).mean() < 0.7)
+
+
+class Compositors(unittest.TestCase):
+    def test_samples_show_what_their_boxes_say(self):
+        person = CutOut(np.full((200, 80, 3), 255, np.uint8), np.ones((200, 80), np.float32), True)
+        room = Sample(Path("room"), np.zeros((90, 200, 3), np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
+        compositor = Compositor([person], [room], 160, 120)
+        counts = set()
+        for seed in range(60):
+            sample = compositor.sample(np.random.default_rng(seed))
+            self.assertEqual(sample.image.shape, (120, 160, 3))
+            self.assertEqual(len(sample.labels), len(sample.boxes))
+            bright = (sample.image > 100).mean()
+            self.assertTrue(bright > 0.01 if len(sample.boxes) else bright < 0.03)  # slivers have no box
+            self.assertTrue((sample.boxes >= 0).all() and (sample.boxes <= [160, 120, 160, 120]).all())
+            counts.add(len(sample.boxes))
+        self.assertLessEqual({0, 1, 2}, counts)
+        again = compositor.sample(np.random.default_rng(59))
+        np.testing.assert_array_equal(again.image, sample.image)
 
 
 if __name__ == "__main__":

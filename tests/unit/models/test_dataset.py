@@ -105,8 +105,8 @@ class Augmentations(unittest.TestCase):
     def test_boxes_stay_within_the_image_and_the_same_seed_gives_the_same_image(self):
         samples = [sample(80, 60, [[10, 5, 40, 55], [50, 20, 79, 59]]), sample(50, 90, [[0, 0, 50, 90]]), sample(64, 64, [])]
         for seed in range(40):
-            image, labels, boxes = augmented(samples, seed % 3, 96, 64, Augmentation(), np.random.default_rng(seed))
-            again, _, _ = augmented(samples, seed % 3, 96, 64, Augmentation(), np.random.default_rng(seed))
+            image, labels, boxes = augmented(samples[seed % 3], samples, 96, 64, Augmentation(), np.random.default_rng(seed))
+            again, _, _ = augmented(samples[seed % 3], samples, 96, 64, Augmentation(), np.random.default_rng(seed))
             self.assertEqual(image.shape, (64, 96, 3))
             self.assertTrue((image == again).all())
             self.assertEqual(len(labels), len(boxes))
