@@ -9,7 +9,7 @@ namespace posed {
 
 namespace {
 
-constexpr int kDraws = 60;            // a plane that holds a third of the points is missed once in ten
+constexpr int kDraws = 60;              // a plane that holds a third of the points is missed once in ten
 constexpr std::size_t kLookedAt = 256;  // points at most that a draw is judged by, evenly spread
 constexpr int kRefinements = 2;
 constexpr float kLeastSine = 0.1F;  // of the angle between two sides of a drawn triangle

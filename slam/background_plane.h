@@ -21,8 +21,9 @@ struct Plane {
   }
 };
 
-/// The plane that holds most of the points, by RANSAC (Fischler and Bolles, 1981) and a fit to the points that it holds; none where that
-/// is less than `least_share` of them. The same points in the same order give the same plane. Reentrant; does not allocate.
+/// The plane that holds most of the points, by RANSAC (Fischler and Bolles, 1981) and a fit to the points that it holds; none
+/// where that is less than `least_share` of them. The same points in the same order give the same plane. Reentrant; does not
+/// allocate.
 std::optional<Plane> find_plane(std::span<const Eigen::Vector3f> points, float least_share);
 
 }  // namespace posed

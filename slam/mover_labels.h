@@ -23,9 +23,9 @@ constexpr std::uint8_t mover_of(std::uint8_t label) {
 /// For each mover, at its number, by how many cells its edge may move from one frame to the next.
 using MoverReach = std::array<std::uint8_t, kMostMovers + 1>;
 
-/// Labels cells without depth that lie among those of movers: hair and black cloth swallow the sensor's light. A hole that movers enclose
-/// for the most part is theirs as a whole; of others, such as a dark screen behind a person, only what lies between cells of a mover is.
-/// Allocates at construction only. Thread-bound.
+/// Labels cells without depth that lie among those of movers: hair and black cloth swallow the sensor's light. A hole that movers
+/// enclose for the most part is theirs as a whole; of others, such as a dark screen behind a person, only what lies between cells
+/// of a mover is. Allocates at construction only. Thread-bound.
 class HoleFiller {
  public:
   explicit HoleFiller(std::size_t cells) : seen_(cells, 0) { hole_.reserve(cells); }

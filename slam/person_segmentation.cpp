@@ -13,16 +13,16 @@ namespace {
 
 constexpr int kClusters = 3;
 constexpr int kIterations = 6;
-constexpr float kOneSurface_m = 0.25F;       // clusters nearer to each other than this are one
-constexpr float kLeastShare = 0.25F;         // of the box's weight, that the nearest cluster must have to be the person
-constexpr float kBodyDepth_m = 0.45F;        // half of it: how far a body reaches from its middle, arms included
-constexpr float kGrowMargin = 0.12F;         // of the box's sides, how far a person may reach beyond it
-constexpr int kPlanes = 2;                   // around a box: a desk and a wall
-constexpr float kAroundMargin = 0.5F;        // of the box's sides, where they are looked for
-constexpr float kLeastPlaneShare = 0.2F;     // of the cells there, that a plane must hold
-constexpr std::size_t kLeastAround = 60;     // [cells]
-constexpr int kWidestGap = 6;                // [cells] where a plane cuts through a person
-constexpr float kLeastPieceShare = 0.2F;     // a piece of less weight than this share of the largest one's is not the person's
+constexpr float kOneSurface_m = 0.25F;    // clusters nearer to each other than this are one
+constexpr float kLeastShare = 0.25F;      // of the box's weight, that the nearest cluster must have to be the person
+constexpr float kBodyDepth_m = 0.45F;     // half of it: how far a body reaches from its middle, arms included
+constexpr float kGrowMargin = 0.12F;      // of the box's sides, how far a person may reach beyond it
+constexpr int kPlanes = 2;                // around a box: a desk and a wall
+constexpr float kAroundMargin = 0.5F;     // of the box's sides, where they are looked for
+constexpr float kLeastPlaneShare = 0.2F;  // of the cells there, that a plane must hold
+constexpr std::size_t kLeastAround = 60;  // [cells]
+constexpr int kWidestGap = 6;             // [cells] where a plane cuts through a person
+constexpr float kLeastPieceShare = 0.2F;  // a piece of less weight than this share of the largest one's is not the person's
 
 }  // namespace
 
@@ -47,7 +47,8 @@ PersonSegmentation::Range PersonSegmentation::cells_of(const BoundingBox& box, f
   return {cell(box.x_min - dx, columns_), cell(box.y_min - dy, rows_), cell(box.x_max + dx, columns_), cell(box.y_max + dy, rows_)};
 }
 
-/// What lies on a plane that is large around the box too, is no person: without this, one who leans over a desk would be as large as it.
+/// What lies on a plane that is large around the box too, is no person: without this, one who leans over a desk would be as large
+/// as it.
 void PersonSegmentation::find_background(const DepthGrid& depth, const BoundingBox& box) {
   const Range inner = cells_of(box, kGrowMargin);
   const Range outer = cells_of(box, kAroundMargin);

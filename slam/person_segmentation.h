@@ -13,9 +13,9 @@
 namespace posed {
 
 /// Cuts the person out of a detected box by depth, so that the background beside them is kept: planes that go on around the box
-/// (desk, floor, wall) are left out, the other depths in the box are clustered (K-means, each cell weighted by how near it is to the
-/// box's middle), the cluster that is the person is chosen, and it grows over connected surface a little beyond the box, because
-/// detectors cut off elbows. Allocates at construction only. Thread-bound.
+/// (desk, floor, wall) are left out, the other depths in the box are clustered (K-means, each cell weighted by how near it is to
+/// the box's middle), the cluster that is the person is chosen, and it grows over connected surface a little beyond the box,
+/// because detectors cut off elbows. Allocates at construction only. Thread-bound.
 class PersonSegmentation {
  public:
   explicit PersonSegmentation(const PinholeCamera& camera);
@@ -48,9 +48,9 @@ class PersonSegmentation {
   GridCamera camera_;
   int columns_;
   int rows_;
-  std::vector<Eigen::Vector3f> around_;        // points of cells around the box
+  std::vector<Eigen::Vector3f> around_;      // points of cells around the box
   std::vector<std::uint8_t> is_background_;  // one entry a cell
-  std::vector<float> weights_;  // of the cells in the box; 0 elsewhere
+  std::vector<float> weights_;               // of the cells in the box; 0 elsewhere
   std::vector<Sample> samples_;
   std::vector<std::uint8_t> seen_;
   std::vector<std::uint32_t> queue_;
