@@ -43,7 +43,6 @@ DynamicMask::DynamicMask(const DynamicConfig& config, const PinholeCamera& camer
       free_space_(camera),
       segmentation_(camera),
       carrier_(camera),
-      holes_(DepthGrid(camera.intrinsics().width, camera.intrinsics().height).size()),
       history_(kHistory, Entry(camera.intrinsics().width, camera.intrinsics().height)) {
   const std::size_t cells = history_.front().labels.size();
   evidence_.assign(cells, CellEvidence::Unknown);
@@ -240,7 +239,7 @@ bool DynamicMask::settle(const Se3& T_odom_camera) {
   free_space_.judge(now.depth, T_odom_camera, now.stamp_ns, evidence_);
   prune(now);
   const bool more = add_moved(now);
-  holes_.fill(now.depth, now.labels);
+  carrier_.fill_holes(now.depth, now.labels);
   forget_dead(now);
   complete();
   free_space_.remember(now.depth, masked_, T_odom_camera, now.stamp_ns);

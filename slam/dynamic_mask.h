@@ -108,7 +108,6 @@ class DynamicMask {
   FreeSpace free_space_;
   PersonSegmentation segmentation_;
   MoverCarrier carrier_;
-  HoleFiller holes_;
   std::vector<Entry> history_;
   std::size_t taken_ = 0;
   std::array<Mover, kMostMovers> movers_;

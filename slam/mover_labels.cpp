@@ -8,11 +8,12 @@
 
 namespace posed {
 
-MoverCarrier::MoverCarrier(const PinholeCamera& camera)
-    : camera_(camera), holes_(DepthGrid(camera.intrinsics().width, camera.intrinsics().height).size()) {
+MoverCarrier::MoverCarrier(const PinholeCamera& camera) : camera_(camera) {
   const DepthGrid grid(camera.intrinsics().width, camera.intrinsics().height);
   front_.reserve(grid.size());
   next_front_.reserve(grid.size());
+  seen_.assign(grid.size(), 0);
+  hole_.reserve(grid.size());
 }
 
 void MoverCarrier::carry(const DepthGrid& from, std::span<const std::uint8_t> labels_from, const Se3& T_to_from,
@@ -36,7 +37,7 @@ void MoverCarrier::carry(const DepthGrid& from, std::span<const std::uint8_t> la
   }
   close_seams(to, labels_to);
   grow(to, reach, labels_to);
-  holes_.fill(to, labels_to);
+  fill_holes(to, labels_to);
 }
 
 /// A surface that comes nearer leaves lines of cells out between those it is carried to.
@@ -80,7 +81,7 @@ void MoverCarrier::grow(const DepthGrid& to, const MoverReach& reach, std::span<
   }
 }
 
-void HoleFiller::fill(const DepthGrid& depth, std::span<std::uint8_t> labels) {
+void MoverCarrier::fill_holes(const DepthGrid& depth, std::span<std::uint8_t> labels) {
   constexpr int kLeastAround = 4;
   std::fill(seen_.begin(), seen_.end(), std::uint8_t{0});
   for (std::size_t first = 0; first < labels.size(); ++first) {
@@ -112,16 +113,21 @@ void HoleFiller::fill(const DepthGrid& depth, std::span<std::uint8_t> labels) {
       }
       continue;
     }
-    std::size_t count = 0;  // of the hole's cells that are filled; they move to its front, and get their label once all are known
+    std::size_t count = 0;  // of the hole's cells that are filled; they move to its front, and get their labels once all are known
     for (std::size_t i = 0; i < hole_.size() && movers > 0; ++i) {
       int around = 0;
-      depth.for_each_around(hole_[i], [&](std::size_t c) { around += labels[c] != 0 ? 1 : 0; });
+      std::uint8_t beside = 0;
+      depth.for_each_around(hole_[i], [&](std::size_t c) {
+        around += labels[c] != 0 ? 1 : 0;
+        beside = std::max(beside, labels[c]);
+      });
       if (around >= kLeastAround) {
+        seen_[hole_[i]] = beside;
         std::swap(hole_[count++], hole_[i]);
       }
     }
     for (std::size_t i = 0; i < count; ++i) {
-      labels[hole_[i]] = label;
+      labels[hole_[i]] = seen_[hole_[i]];
     }
   }
 }

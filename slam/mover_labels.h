@@ -23,20 +23,6 @@ constexpr std::uint8_t mover_of(std::uint8_t label) {
 /// For each mover, at its number, by how many cells its edge may move from one frame to the next.
 using MoverReach = std::array<std::uint8_t, kMostMovers + 1>;
 
-/// Labels cells without depth that lie among those of movers: hair and black cloth swallow the sensor's light. A hole that movers
-/// enclose for the most part is theirs as a whole; of others, such as a dark screen behind a person, only what lies between cells
-/// of a mover is. Allocates at construction only. Thread-bound.
-class HoleFiller {
- public:
-  explicit HoleFiller(std::size_t cells) : seen_(cells, 0) { hole_.reserve(cells); }
-
-  void fill(const DepthGrid& depth, std::span<std::uint8_t> labels);
-
- private:
-  std::vector<std::uint8_t> seen_;
-  std::vector<std::uint32_t> hole_;
-};
-
 /// Moves labels from one frame to a later one. Allocates at construction only. Thread-bound.
 class MoverCarrier {
  public:
@@ -47,14 +33,20 @@ class MoverCarrier {
   void carry(const DepthGrid& from, std::span<const std::uint8_t> labels_from, const Se3& T_to_from, const MoverReach& reach,
              const DepthGrid& to, std::span<std::uint8_t> labels_to);
 
+  /// Labels cells without depth that lie among those of movers: hair and black cloth swallow the sensor's light. A hole that movers
+  /// enclose for the most part is theirs as a whole; of others, such as a dark screen behind a person, only what lies between cells
+  /// of a mover is.
+  void fill_holes(const DepthGrid& depth, std::span<std::uint8_t> labels);
+
  private:
   void close_seams(const DepthGrid& to, std::span<std::uint8_t> labels_to);
   void grow(const DepthGrid& to, const MoverReach& reach, std::span<std::uint8_t> labels_to);
 
   GridCamera camera_;
-  HoleFiller holes_;
   std::vector<std::uint32_t> front_;
   std::vector<std::uint32_t> next_front_;
+  std::vector<std::uint8_t> seen_;
+  std::vector<std::uint32_t> hole_;
 };
 
 }  // namespace posed
