@@ -19,9 +19,11 @@ constexpr float kFoundGain = 0.5F;
 constexpr float kScoreGain = 3.0F;   // for each unit of score above...
 constexpr float kPlainScore = 0.4F;  // ...this
 constexpr float kMissedLoss = 0.2F;
-// Boxes below this score are published, but nothing is masked for them, not even to confirm someone known: of the shipped networks
-// half of those are furniture, and a wrong box costs more of the static scene than a look without any.
-constexpr float kLeastScore = 0.5F;
+// A box below the first score makes nobody new: among those of the shipped networks are too many on furniture, and a wrong box costs
+// more of the static scene than a look without any. Down to the second it confirms a mover that it meets, be it a person known
+// from surer boxes or something that was only seen to move (Zhang et al., "ByteTrack", ECCV 2022, use boxes of low score so).
+constexpr float kNewScore = 0.5F;
+constexpr float kKnownScore = 0.4F;
 constexpr float kSureStrength = 1.5F;
 constexpr double kSureMemory = 2.0;         // times the memory of others
 constexpr float kAllStatic = 0.7F;          // share of a person's cells that were there before, which makes them doubtful
@@ -124,7 +126,7 @@ void DynamicMask::take_in(const Detections& detections) {
   }
   const Entry& then = history_[(taken_ - 1 - back) % kHistory];
   for (const Detection& detection : detections.found()) {
-    if (detection.score < kLeastScore) {
+    if (detection.score < kKnownScore) {
       break;  // they come most confident first
     }
     segmentation_.segment(then.depth, detection.box, cells_);
@@ -170,6 +172,9 @@ void DynamicMask::meet(float score) {
   const auto best = static_cast<std::size_t>(std::max_element(common.begin() + 1, common.end()) - common.begin());
   const bool known =
       static_cast<float>(common[best]) >= kSameMover * static_cast<float>(std::min(own, area[best])) && area[best] > 0;
+  if (!known && score < kNewScore) {
+    return;
+  }
   const auto id = known ? static_cast<std::uint8_t>(best) : new_mover();
   if (id == 0) {
     return;  // more movers than anyone can tell apart

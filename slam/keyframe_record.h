@@ -39,6 +39,7 @@ struct KeyframeRecord {
   std::vector<Eigen::Vector2f> ideal_pixels;  ///< undistorted keypoints
   std::vector<float> depth_m;                 ///< 0 where the sensor saw none
   std::vector<LandmarkId> landmarks;          ///< matched landmark, or kNoLandmark
+  bool shows_movers = false;  ///< or what was taken for them: who else moved there may have been missed
   /// Landmarks that the frame's depth speaks of though no keypoint matches them, both ascending:
   std::vector<LandmarkId> hidden;   ///< something is in front of them, so that they were not found says nothing
   std::vector<LandmarkId> refuted;  ///< the camera sees right through their place, or a mover is there: they are gone

@@ -71,6 +71,7 @@ void copy_static(const FeatureFrame& frame, std::span<const std::int32_t> landma
   record.landmarks.clear();
   record.hidden.clear();
   record.refuted.clear();
+  record.shows_movers = mask != nullptr && mask->summary().masked_share > 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     const Keypoint& keypoint = frame.features().keypoints[i];
     if (mask != nullptr && mask->is_mover(keypoint.x, keypoint.y, frame.depth_m()[i])) {

@@ -11,6 +11,9 @@ namespace {
 constexpr double kMinDepth_m = 0.05;
 constexpr std::uint32_t kPredictedBeforeCull = 4;  // keyframes that should have seen a landmark before it is judged
 constexpr double kMinFoundShare = 0.3;
+// Where something moved, a landmark that no second keyframe has found by then is taken for a mover's that was missed (the test of recent map
+// points of Mur-Artal and Tardos, "ORB-SLAM2", T-RO 2017, which makes it everywhere, and asks for three).
+constexpr KeyframeId kConfirmedWithin = 3;
 // How a keyframe changes the log-odds of a landmark's being static: seen again where it was; or seen through (the depth sensor errs
 // at edges, so one look is not enough).
 constexpr float kFoundLogOdds = 0.6F;
@@ -40,6 +43,10 @@ void LocalMapper::insert(const KeyframeRecord& record, std::uint32_t map_id, con
   keyframe.T_map_camera = T_map_camera;
   extend_observed(record);
   judge_predicted(record);
+  remove_unconfirmed(record.id);
+  if (record.shows_movers) {
+    unconfirmed_.push_back(record.id);
+  }
   create_from_depth(record);
   link_to_tree(record);
 }
@@ -93,6 +100,23 @@ void LocalMapper::judge_predicted(const KeyframeRecord& record) {
     landmark.found += found ? 1 : 0;
     if (landmark.predicted >= kPredictedBeforeCull && landmark.found < kMinFoundShare * landmark.predicted) {
       map_.remove_landmark(id);
+    }
+  }
+}
+
+void LocalMapper::remove_unconfirmed(KeyframeId newest) {
+  while (!unconfirmed_.empty() && unconfirmed_.front() + kConfirmedWithin <= newest) {
+    const Keyframe* const keyframe = map_.find_keyframe(unconfirmed_.front());
+    unconfirmed_.pop_front();
+    if (keyframe == nullptr) {
+      continue;  // dropped since
+    }
+    const std::vector<LandmarkId> landmarks = keyframe->landmarks;
+    for (const LandmarkId id : landmarks) {
+      const Landmark* const landmark = id == kNoLandmark ? nullptr : map_.find_landmark(id);
+      if (landmark != nullptr && landmark->observations.size() == 1) {
+        map_.remove_landmark(id);
+      }
     }
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <vector>
 
 #include "config/config.h"
@@ -50,6 +51,7 @@ class LocalMapper {
   void link_to_tree(const KeyframeRecord& record);
   void extend_observed(const KeyframeRecord& record);
   void judge_predicted(const KeyframeRecord& record);
+  void remove_unconfirmed(KeyframeId newest);
   void create_from_depth(const KeyframeRecord& record);
 
   double close_depth_m_;
@@ -59,6 +61,7 @@ class LocalMapper {
   LandmarkTriangulation triangulation_;
   LandmarkFusion fusion_;
   MapAdjuster adjuster_;
+  std::deque<KeyframeId> unconfirmed_;  // keyframes that showed movers, whose landmarks are still to be found again
 };
 
 }  // namespace posed

@@ -52,7 +52,7 @@ const char* name_of(DynamicMode mode) {
 /// One replay, judged.
 struct Run {
   ErrorStatistics ate_m;
-  double coverage = 0;
+  double tracked = 0;  ///< share of the frames
   LatencySummary track;
 };
 
@@ -140,14 +140,12 @@ Result<Run> run_once(const Config& config, const std::filesystem::path& sequence
     return tl::unexpected(truth.error());
   }
   const auto keyframe_pose = [&app](std::uint64_t keyframe) { return (*app)->keyframe_pose(keyframe); };
-  TrajectoryErrorOptions error_options;
-  error_options.frames = recorder->frames().size();
-  const Result<TrajectoryError> error =
-      evaluate_trajectory(*truth, recorder->final_trajectory(keyframe_pose).trajectory, error_options);
+  const Result<TrajectoryError> error = evaluate_trajectory(*truth, recorder->final_trajectory(keyframe_pose).trajectory, {});
   if (!error) {
     return make_error(error.error().code, fmt::format("{}: {}", sequence.string(), error.error().message));
   }
-  return Run{error->ate_m, error->coverage, health.track};
+  const auto frames = static_cast<double>(std::max<std::size_t>(1, recorder->frames().size()));
+  return Run{error->ate_m, static_cast<double>(health.frames_tracked) / frames, health.track};
 }
 
 Result<Row> run_mode(const BenchOptions& options, const std::filesystem::path& sequence, DynamicMode mode,
@@ -186,7 +184,7 @@ std::string to_markdown(const std::vector<Row>& rows) {
   for (const Row& row : rows) {
     const ErrorStatistics& e = row.run.ate_m;
     text += fmt::format("| {} | {} | {:.1f} % | {:.4f} | {:.4f} | {:.4f} | {:.4f} | {} | {:.1f}, {:.1f} |\n", row.sequence,
-                        name_of(row.mode), 100 * row.run.coverage, e.rmse, e.median, e.mean, e.std,
+                        name_of(row.mode), 100 * row.run.tracked, e.rmse, e.median, e.mean, e.std,
                         row.improvement ? fmt::format("{:.1f} %", 100 * *row.improvement) : "", row.run.track.p50_ms,
                         row.run.track.p99_ms);
   }
@@ -198,7 +196,7 @@ std::string to_csv(const std::vector<Row>& rows) {
   for (const Row& row : rows) {
     const ErrorStatistics& e = row.run.ate_m;
     text += fmt::format("{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{:.3f},{:.3f}\n", row.sequence, name_of(row.mode),
-                        row.run.coverage, e.rmse, e.median, e.mean, e.std,
+                        row.run.tracked, e.rmse, e.median, e.mean, e.std,
                         row.improvement ? fmt::format("{:.6f}", *row.improvement) : "", row.run.track.p50_ms, row.run.track.p99_ms);
   }
   return text;

@@ -101,6 +101,32 @@ TEST_F(MapperTest, ForgetsLandmarksThatAreNotSeenAgain) {
   EXPECT_LT(mapper.landmark_count(), before / 10);
 }
 
+TEST_F(MapperTest, WherePeopleAreAboutLandmarksMustBeSeenTwice) {
+  const auto landmarks_after = [&](bool shows_movers) {
+    Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
+    const auto view = world.view(Se3());
+    KeyframeRecord first = FeatureWorld::record(view, 1, {});
+    first.shows_movers = shows_movers;
+    mapper.insert(first);
+    // Every second landmark of the first keyframe is found again, once; then the camera looks elsewhere.
+    std::vector<LandmarkId> known = landmarks_by_point(snapshot_of(mapper));
+    for (std::size_t i = 0; i < known.size(); i += 2) {
+      known[i] = kNoLandmark;
+    }
+    for (KeyframeId id = 2; id <= 4; ++id) {
+      KeyframeRecord next = FeatureWorld::record(id == 2 ? view : world.view(shifted(0, 3.0)), id, id == 2 ? known : std::vector<LandmarkId>{});
+      std::fill(next.depth_m.begin(), next.depth_m.end(), 0.0F);
+      mapper.insert(next);
+    }
+    return mapper.landmark_count();
+  };
+  const std::size_t all = landmarks_after(false);
+  const std::size_t confirmed = landmarks_after(true);
+  EXPECT_GT(all, 100U);
+  EXPECT_LT(confirmed, 0.7 * static_cast<double>(all));
+  EXPECT_GT(confirmed, 0.3 * static_cast<double>(all));
+}
+
 TEST_F(MapperTest, IgnoresMatchesWithLandmarksItHasCulled) {
   Mapper mapper(tracker, config, MapMode::Mapping, world.intrinsics);
   mapper.insert(FeatureWorld::record(world.view(Se3()), 1, {}));
