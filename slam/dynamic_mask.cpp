@@ -19,9 +19,9 @@ constexpr float kFoundGain = 0.5F;
 constexpr float kScoreGain = 3.0F;   // for each unit of score above...
 constexpr float kPlainScore = 0.4F;  // ...this
 constexpr float kMissedLoss = 0.2F;
-// A box below the first score makes nobody new: among those of the shipped networks are too many on furniture, and a wrong box costs
-// more of the static scene than a look without any. Down to the second it confirms a mover that it meets, be it a person known
-// from surer boxes or something that was only seen to move (Zhang et al., "ByteTrack", ECCV 2022, use boxes of low score so).
+// A box below the first score makes nobody new: among those of the shipped networks are too many on furniture, and a wrong box
+// costs more of the static scene than a look without any. Down to the second it confirms a mover that it meets, be it a person
+// known from surer boxes or something that was only seen to move (Zhang et al., "ByteTrack", ECCV 2022, use boxes of low score so).
 constexpr float kNewScore = 0.5F;
 constexpr float kKnownScore = 0.4F;
 constexpr float kSureStrength = 1.5F;

@@ -11,8 +11,8 @@ namespace {
 constexpr double kMinDepth_m = 0.05;
 constexpr std::uint32_t kPredictedBeforeCull = 4;  // keyframes that should have seen a landmark before it is judged
 constexpr double kMinFoundShare = 0.3;
-// Where something moved, a landmark that no second keyframe has found by then is taken for a mover's that was missed (the test of recent map
-// points of Mur-Artal and Tardos, "ORB-SLAM2", T-RO 2017, which makes it everywhere, and asks for three).
+// Where something moved, a landmark that no second keyframe has found by then is taken for a mover's that was missed (the test of
+// recent map points of Mur-Artal and Tardos, "ORB-SLAM2", T-RO 2017, which makes it everywhere, and asks for three).
 constexpr KeyframeId kConfirmedWithin = 3;
 // How a keyframe changes the log-odds of a landmark's being static: seen again where it was; or seen through (the depth sensor errs
 // at edges, so one look is not enough).

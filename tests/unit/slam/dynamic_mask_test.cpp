@@ -350,6 +350,22 @@ TEST(DynamicMaskTest, OneUnsureDetectionDoesNotStandAgainstAppearance) {
   EXPECT_EQ(scene.mask().summary().masked_share, 0) << "it stood there for two seconds";
 }
 
+TEST(DynamicMaskTest, ABoxOfLowScoreConfirmsWhoIsKnownAndMakesNobodyNew) {
+  constexpr Rectangle kOther{440, 120, 560, 480};
+  constexpr int kFrames = 200;  // longer than anybody is remembered
+  Scene scene;
+  for (int i = 0; i < kFrames; ++i) {
+    scene.wall().put(kBody, kBody_m).put(kOther, kBody_m);
+    Detections found = scene.detected(kBody, i == 0 ? 0.9F : 0.45F);
+    if (i % 2 == 1) {
+      found = scene.detected(kOther, 0.45F);
+    }
+    scene.show(&found);
+  }
+  EXPECT_GT(scene.masked_share(kBody), 0.95);
+  EXPECT_EQ(scene.masked_share(kOther), 0);
+}
+
 TEST(DynamicMaskTest, TheBackgroundBesideAnEdgeIsKept) {
   Scene scene;
   const Rectangle body{204, 120, 324, 480};  // its edges cut cells in halves

@@ -114,7 +114,8 @@ TEST_F(MapperTest, WherePeopleAreAboutLandmarksMustBeSeenTwice) {
       known[i] = kNoLandmark;
     }
     for (KeyframeId id = 2; id <= 4; ++id) {
-      KeyframeRecord next = FeatureWorld::record(id == 2 ? view : world.view(shifted(0, 3.0)), id, id == 2 ? known : std::vector<LandmarkId>{});
+      KeyframeRecord next =
+          FeatureWorld::record(id == 2 ? view : world.view(shifted(0, 3.0)), id, id == 2 ? known : std::vector<LandmarkId>{});
       std::fill(next.depth_m.begin(), next.depth_m.end(), 0.0F);
       mapper.insert(next);
     }
