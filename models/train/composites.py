@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from boxes import iou_matrix
-from dataset import DataError, Sample, read_folder
+from dataset import DataError, Sample
 
 
 @dataclass

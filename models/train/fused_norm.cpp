@@ -30,7 +30,7 @@ inline Bfloat16 narrowed(float f) {
 
 inline float sigmoid(float v) { return 1.0F / (1.0F + std::exp(-v)); }
 
-// Adds two sums of every channel over all rows: `term(row, channel, &first, &second)` gives what a value adds.
+// Two sums of every channel over all rows: `term(row, a, b)` adds a row's values to `a` and `b`, one entry a channel.
 template <typename Term>
 void sum_rows(std::int64_t rows, std::int64_t channels, double* first, double* second, const Term& term) {
   std::vector<float> partial(static_cast<std::size_t>(2 * channels));
