@@ -112,9 +112,17 @@ def ragged(alpha: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def hide(cover: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """What stands before people: everything below a line, as of a desk, or a block in the lower part, as of a screen."""
+    """What stands before people: everything below a line, as of a desk, a block in the lower part, as of a screen, or small things on a
+    desk, of any outline."""
     height, width = cover.shape
-    if rng.random() < 0.5:
+    kind = rng.random()
+    if kind < 0.3:
+        coarse = rng.normal(0, 1, (rng.integers(5, 12), rng.integers(5, 14))).astype(np.float32)
+        things = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
+        things += np.linspace(-2.5, rng.uniform(0.0, 1.2), height, dtype=np.float32)[:, None]
+        things[: int(0.3 * height)] = 0  # heads stay
+        return np.where(things > 0, np.float32(0), cover)
+    if kind < 0.65:
         edge = np.interp(np.arange(width), [0, width], rng.uniform(0.6, 0.95, 2) * height)
         return cover * (np.arange(height)[:, None] < edge)
     left, top = rng.uniform(-0.2, 0.8) * width, rng.uniform(0.35, 0.8) * height
@@ -125,8 +133,20 @@ def hide(cover: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.where(block > 0, np.float32(0), cover)
 
 
-def placed(person: CutOut, width: int, height: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """The person as a layer of width x height, near and maybe beyond its edges: colours, and how much they cover (0 to 1)."""
+def position_across(w: int, width: int, beside: float | None, rng: np.random.Generator) -> float:
+    """Left edge of a person of width w: beside another one whose middle is given, mostly cut off by a side of the image, or anywhere."""
+    if beside is not None and rng.random() < 0.5:
+        return beside - 0.5 * w + rng.uniform(0.15, 0.7) * w * rng.choice((-1, 1))
+    if rng.random() < 0.35:
+        seen = rng.uniform(0.15, 0.6) * w
+        return seen - w if rng.random() < 0.5 else width - seen
+    return rng.uniform(-0.5 * w, width - 0.5 * w)
+
+
+def placed(person: CutOut, width: int, height: int, beside: float | None,
+           rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
+    """The person as a layer of width x height, near and maybe beyond its edges: colours, how much they cover (0 to 1), and where the
+    person's middle is."""
     wanted = rng.uniform(0.4, 1.3) if person.cut_below else rng.uniform(0.55, 1.7)
     size = min(height * wanted / person.image.shape[0], 1.2 * width / person.image.shape[1])
     look = cv2.resize(person.image, None, fx=size, fy=size, interpolation=cv2.INTER_LINEAR if size > 1 else cv2.INTER_AREA)
@@ -138,7 +158,7 @@ def placed(person: CutOut, width: int, height: int, rng: np.random.Generator) ->
     gain, offset = rng.uniform(0.7, 1.2) * rng.uniform(0.92, 1.08, 3), rng.uniform(-25, 15)
     look = np.clip(look * gain + offset, 0, 255)
     h, w = alpha.shape
-    x = int(rng.uniform(-0.5 * w, width - 0.5 * w))
+    x = int(position_across(w, width, beside, rng))
     if person.cut_below:
         highest, lowest = max(height - h, 0), max(height - 0.45 * h, 0.35 * height)
     else:
@@ -147,7 +167,7 @@ def placed(person: CutOut, width: int, height: int, rng: np.random.Generator) ->
     matrix = np.float32([[1, 0, x], [0, 1, y]])
     layer = cv2.warpAffine(look.astype(np.float32), matrix, (width, height))
     cover = cv2.warpAffine(alpha.astype(np.float32), matrix, (width, height))
-    return layer, hide(cover, rng) if rng.random() < 0.35 else cover
+    return layer, hide(cover, rng) if rng.random() < 0.45 else cover, x + 0.5 * w
 
 
 def composite(background: np.ndarray, people: list[CutOut], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -155,8 +175,9 @@ def composite(background: np.ndarray, people: list[CutOut], rng: np.random.Gener
     image = background
     height, width = image.shape[:2]
     visible: list[np.ndarray] = []
+    middle = None
     for person in people:
-        layer, cover = placed(person, width, height, rng)
+        layer, cover, middle = placed(person, width, height, middle, rng)
         image = (image * (1 - cover[..., None]) + layer * cover[..., None]).astype(np.uint8)
         visible = [v & (cover < 0.5) for v in visible] + [cover >= 0.5]
     boxes = []
@@ -177,6 +198,38 @@ def background_of(sample: Sample, width: int, height: int, rng: np.random.Genera
     return cut[:, ::-1] if rng.random() < 0.5 else cut
 
 
+def clutter(image: np.ndarray, others: list[np.ndarray], rng: np.random.Generator) -> np.ndarray:
+    """Small things lie about in groups, as on a desk: cut at random from other images. A detector that has seen none takes a heap of
+    them for a person."""
+    height, width = image.shape[:2]
+    image = image.copy()
+    for _ in range(rng.integers(1, 4)):
+        middle = rng.uniform([0.1, 0.3], [0.9, 0.9]) * [width, height]
+        for _ in range(rng.integers(3, 16)):
+            other = others[rng.integers(len(others))]
+            h, w = other.shape[:2]
+            cut_w, cut_h = rng.integers(16, max(min(w, 160), 17)), rng.integers(16, max(min(h, 160), 17))
+            x, y = rng.integers(max(w - cut_w, 1)), rng.integers(max(h - cut_h, 1))
+            size = rng.uniform(0.04, 0.16) * width
+            turn = cv2.getRotationMatrix2D((cut_w / 2, cut_h / 2), rng.uniform(0, 360), size / max(cut_w, cut_h))
+            place = middle + rng.normal(0, 0.11, 2) * width
+            turn[:, 2] += size / 2 + 1 - np.array([cut_w, cut_h]) / 2
+            side = int(1.5 * size) + 2
+            turn[:, 2] += 0.25 * size
+            thing = cv2.warpAffine(other[y : y + cut_h, x : x + cut_w], turn, (side, side), flags=cv2.INTER_AREA)
+            shape = np.full((cut_h, cut_w), 255, np.uint8)
+            if rng.random() < 0.4:
+                shape[:] = 0
+                cv2.ellipse(shape, (int(cut_w) // 2, int(cut_h) // 2), (int(cut_w) // 2, int(cut_h) // 2), 0, 0, 360, 255, -1)
+            cover = cv2.warpAffine(shape, turn, (side, side)) > 127
+            left, top = (place - side / 2).astype(int)
+            x0, y0, x1, y1 = max(left, 0), max(top, 0), min(left + side, width), min(top + side, height)
+            if x1 > x0 and y1 > y0:
+                part = slice(y0 - top, y1 - top), slice(x0 - left, x1 - left)
+                image[y0:y1, x0:x1][cover[part]] = thing[part][cover[part]]
+    return image
+
+
 @dataclass
 class Compositor:
     """Makes samples of people and backgrounds, a new one each time."""
@@ -188,6 +241,8 @@ class Compositor:
 
     def sample(self, rng: np.random.Generator) -> Sample:
         background = background_of(self.backgrounds[rng.integers(len(self.backgrounds))], self.width, self.height, rng)
+        if rng.random() < 0.4:
+            background = clutter(background, [self.backgrounds[i].image for i in rng.integers(len(self.backgrounds), size=8)], rng)
         count = rng.choice(4, p=[0.15, 0.5, 0.25, 0.1])
         image, boxes = composite(background, [self.people[rng.integers(len(self.people))] for _ in range(count)], rng)
         return Sample(Path("composite"), image, np.zeros(len(boxes), np.int64), boxes.astype(np.float32))

@@ -3,6 +3,7 @@ same in all of them."""
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from typing import Iterable
 
@@ -41,11 +42,14 @@ def fork_team(size: int) -> Team:
     copies end where the caller lets them."""
     if size == 1:
         return Team()
-    meeting = os.path.join(tempfile.mkdtemp(prefix="posed-train-"), "meeting")
+    folder = tempfile.mkdtemp(prefix="posed-train-")
     rank = 0
     for i in range(1, size):
         if os.fork() == 0:
             rank = i
             break
-    distributed.init_process_group("gloo", init_method=f"file://{meeting}", rank=rank, world_size=size)
+    distributed.init_process_group("gloo", init_method=f"file://{folder}/meeting", rank=rank, world_size=size)
+    distributed.barrier()  # everyone has met
+    if rank == 0:
+        shutil.rmtree(folder)
     return Team(rank, size)

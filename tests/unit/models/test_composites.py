@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from composites import Compositor, CutOut, background_of, composite, cut_by_mask, cut_out, hide, ragged, read_cut_outs
+from composites import Compositor, CutOut, background_of, clutter, composite, cut_by_mask, cut_out, hide, position_across, ragged, read_cut_outs
 from dataset import DataError, Sample
 
 
@@ -57,6 +57,23 @@ class Composites(unittest.TestCase):
             _, boxes = composite(np.zeros((120, 160, 3), np.uint8), [person], np.random.default_rng(seed))
             reached += sum(int(box[3] == 120) for box in boxes)
         self.assertGreater(reached, 20)  # the others stand behind a desk
+
+    def test_some_people_are_mostly_outside_of_the_image_and_of_two_some_overlap(self):
+        alone = [position_across(60, 400, None, np.random.default_rng(seed)) for seed in range(200)]
+        seen = np.minimum(np.array(alone) + 60, 400) - np.maximum(alone, 0)
+        self.assertTrue((seen >= 0.15 * 60 - 1e-9).all())
+        self.assertTrue(0.15 < (seen < 0.5 * 60).mean() < 0.45)
+        beside = [position_across(60, 400, 200.0, np.random.default_rng(seed)) + 30 for seed in range(200)]
+        apart = np.abs(np.array(beside) - 200)
+        self.assertTrue(0.4 < ((apart > 0.1 * 60) & (apart < 0.75 * 60)).mean() < 0.75)
+
+    def test_clutter_lies_in_groups_on_what_was_there(self):
+        things = [np.full((50, 70, 3), 255, np.uint8), np.full((8, 300, 3), 200, np.uint8)]
+        for seed in range(30):
+            desk = np.zeros((120, 160, 3), np.uint8)
+            image = clutter(desk, things, np.random.default_rng(seed))
+            self.assertFalse(desk.any())
+            self.assertTrue(0.002 < image[..., 0].any(1).mean() and 0.002 < (image > 0).mean() < 0.6)
 
     def test_a_background_keeps_its_contents_and_takes_the_size(self):
         sample = Sample(Path("room"), np.full((90, 200, 3), 77, np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
