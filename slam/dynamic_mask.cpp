@@ -12,24 +12,11 @@ namespace {
 constexpr double kReachPeriod_s = 0.034;  // in which a mover's edge moves by at most a cell more
 constexpr int kMostReach = 5;             // [cells] a frame
 constexpr float kSameMover = 0.3F;        // of the smaller of two areas: they overlap by more, so they are one
-// A detector's looks add up to a person's strength as log-likelihoods do: a sure look gains, a miss loses, and boxes that come and
-// go on furniture stay below what it takes to stand against all appearance.
-constexpr float kStrengthCap = 4.0F;
-constexpr float kFoundGain = 0.5F;
-constexpr float kScoreGain = 3.0F;   // for each unit of score above...
-constexpr float kPlainScore = 0.4F;  // ...this
-constexpr float kMissedLoss = 0.2F;
 // A box below the first score makes nobody new: among those of the shipped networks are too many on furniture, and a wrong box
 // costs more of the static scene than a look without any. Down to the second it confirms a mover that it meets, be it a person
 // known from surer boxes or something that was only seen to move (Zhang et al., "ByteTrack", ECCV 2022, use boxes of low score so).
 constexpr float kNewScore = 0.5F;
 constexpr float kKnownScore = 0.4F;
-constexpr float kSureStrength = 1.5F;
-constexpr double kSureMemory = 2.0;         // times the memory of others
-constexpr float kAllStatic = 0.7F;          // share of a person's cells that were there before, which makes them doubtful
-constexpr float kMuchMoved = 0.2F;          // share of a person's cells that have moved, which says that they walk
-constexpr float kAnyMoved = 0.05F;          // share of cells that have moved, which confirms a mover
-constexpr std::size_t kLeastCells = 6;      // of a mover
 constexpr int kMovedAround = 3;             // moved or masked neighbours without which a moved cell is taken for noise
 constexpr int kMovedReach = 10;             // [cells] from what has moved, over connected surface that may have
 constexpr int kTrimReach = 4;               // [cells] around a person's core, that stay theirs at a new detection
@@ -45,6 +32,7 @@ DynamicMask::DynamicMask(const DynamicConfig& config, const PinholeCamera& camer
       free_space_(camera),
       segmentation_(camera),
       carrier_(camera),
+      movers_(config.memory_s),
       history_(kHistory, Entry(camera.intrinsics().width, camera.intrinsics().height)) {
   const std::size_t cells = history_.front().labels.size();
   evidence_.assign(cells, CellEvidence::Unknown);
@@ -77,8 +65,8 @@ void DynamicMask::begin(const RgbdFrame& frame, const Se3& T_odom_camera, const 
     const Entry& before = history_[(taken_ - 2) % kHistory];
     const double elapsed_s = to_seconds(now.stamp_ns - before.stamp_ns);
     const int reach = std::clamp(1 + static_cast<int>(std::lround(elapsed_s / kReachPeriod_s)), 1, kMostReach);
-    for (std::size_t i = 0; i < movers_.size(); ++i) {
-      reach_[i + 1] = movers_[i].person || movers_[i].moving ? static_cast<std::uint8_t>(reach) : std::uint8_t{0};
+    for (std::uint8_t id = 1; id < reach_.size(); ++id) {
+      reach_[id] = movers_[id].person || movers_[id].moving ? static_cast<std::uint8_t>(reach) : std::uint8_t{0};
     }
     carrier_.carry(before.depth, before.labels, T_odom_camera.inverse() * before.T_odom_camera, reach_, now.depth, now.labels);
   }
@@ -100,7 +88,7 @@ void DynamicMask::begin(const RgbdFrame& frame, const Se3& T_odom_camera, const 
 void DynamicMask::mask_boxes(const Detections& detections) {
   Entry& now = newest();
   std::fill(now.labels.begin(), now.labels.end(), std::uint8_t{0});
-  movers_[0] = Mover{true, true, kStrengthCap, true, now.stamp_ns, true};
+  movers_.assign_person(1, now.stamp_ns);
   for (const Detection& d : detections.found()) {
     for (int row = 0; row < now.depth.rows(); ++row) {
       for (int column = 0; column < now.depth.columns(); ++column) {
@@ -119,18 +107,14 @@ void DynamicMask::take_in(const Detections& detections) {
   if (back == kHistory || newest().stamp_ns - detections.stamp_utc_ns > kRecallNs) {
     return;
   }
-  for (Mover& mover : movers_) {
-    if (mover.person) {
-      mover.strength -= kMissedLoss;  // whom the detector sees gets it back
-    }
-  }
+  movers_.looked();
   const Entry& then = history_[(taken_ - 1 - back) % kHistory];
   for (const Detection& detection : detections.found()) {
     if (detection.score < kKnownScore) {
       break;  // they come most confident first
     }
     segmentation_.segment(then.depth, detection.box, cells_);
-    if (cells_.size() < kLeastCells) {
+    if (cells_.size() < MoverTable::kLeastCells) {
       continue;
     }
     std::fill(carried_.begin(), carried_.end(), std::uint8_t{0});
@@ -156,8 +140,8 @@ void DynamicMask::carry_to_present(std::size_t frames_back) {
 /// Joins `carried_` with the mover it overlaps most, or makes it one.
 void DynamicMask::meet(float score) {
   Entry& now = newest();
-  std::array<std::size_t, kMostMovers + 1> area{};
-  std::array<std::size_t, kMostMovers + 1> common{};
+  MoverTable::PerMover<std::size_t> area{};
+  MoverTable::PerMover<std::size_t> common{};
   std::size_t own = 0;
   for (std::size_t cell = 0; cell < carried_.size(); ++cell) {
     ++area[mover_of(now.labels[cell])];
@@ -166,7 +150,7 @@ void DynamicMask::meet(float score) {
       ++common[mover_of(now.labels[cell])];
     }
   }
-  if (own < kLeastCells) {
+  if (own < MoverTable::kLeastCells) {
     return;
   }
   const auto best = static_cast<std::size_t>(std::max_element(common.begin() + 1, common.end()) - common.begin());
@@ -175,15 +159,11 @@ void DynamicMask::meet(float score) {
   if (!known && score < kNewScore) {
     return;
   }
-  const auto id = known ? static_cast<std::uint8_t>(best) : new_mover();
+  const auto id = known ? static_cast<std::uint8_t>(best) : movers_.add(now.stamp_ns);
   if (id == 0) {
     return;  // more movers than anyone can tell apart
   }
-  Mover& mover = movers_[id - 1];
-  mover.person = true;
-  mover.strength = std::min(kStrengthCap, mover.strength + kMissedLoss + kFoundGain + kScoreGain * (score - kPlainScore));
-  mover.sure = mover.sure || mover.strength >= kSureStrength;
-  mover.confirmed_ns = now.stamp_ns;
+  movers_.found(id, score, now.stamp_ns);
   for (std::size_t cell = 0; cell < carried_.size(); ++cell) {
     if (now.labels[cell] == (id | kPersonCore)) {
       now.labels[cell] = id;  // the newest box says what is the person's core; an earlier one may have held more
@@ -224,17 +204,6 @@ void DynamicMask::trim(std::uint8_t id) {
   }
 }
 
-std::uint8_t DynamicMask::new_mover() {
-  const auto free = std::find_if(movers_.begin(), movers_.end(), [](const Mover& m) { return !m.alive; });
-  if (free == movers_.end()) {
-    return 0;
-  }
-  *free = Mover{};
-  free->alive = true;
-  free->confirmed_ns = newest().stamp_ns;
-  return static_cast<std::uint8_t>(free - movers_.begin() + 1);
-}
-
 bool DynamicMask::settle(const Se3& T_odom_camera) {
   Entry& now = newest();
   now.T_odom_camera = T_odom_camera;
@@ -245,7 +214,7 @@ bool DynamicMask::settle(const Se3& T_odom_camera) {
   prune(now);
   const bool more = add_moved(now);
   carrier_.fill_holes(now.depth, now.labels);
-  forget_dead(now);
+  forget_dead();
   complete();
   free_space_.remember(now.depth, masked_, T_odom_camera, now.stamp_ns);
   return more;
@@ -254,7 +223,7 @@ bool DynamicMask::settle(const Se3& T_odom_camera) {
 void DynamicMask::settle_lost() {
   free_space_.forget();
   if (config_.mode == DynamicMode::Full) {
-    forget_dead(newest());
+    forget_dead();
     complete();
   }
 }
@@ -262,25 +231,14 @@ void DynamicMask::settle_lost() {
 /// What was there before is no mover's, unless a detector says so. Even then, where a person walks: of their core the lesser part
 /// that was there before is the desk they pass.
 void DynamicMask::prune(Entry& now) {
-  struct Count {
-    std::size_t cells = 0;
-    std::size_t moved = 0;
-    std::size_t was_there = 0;
-    std::size_t core = 0;
-    std::size_t rested_core = 0;
-    std::size_t needed(float share) const {
-      return std::max(kLeastCells, static_cast<std::size_t>(share * static_cast<float>(cells)));
-    }
-    bool walks() const { return moved > needed(kMuchMoved); }
-  };
   const auto rested = [&](std::size_t cell) {
     return evidence_[cell] == CellEvidence::Static || evidence_[cell] == CellEvidence::Resting;
   };
-  std::array<Count, kMostMovers + 1> counts{};
+  MoverTable::PerMover<MoverEvidence> counts{};
   for (std::size_t cell = 0; cell < now.labels.size(); ++cell) {
     const std::uint8_t label = now.labels[cell];
     const bool core = (label & kPersonCore) != 0;
-    Count& count = counts[mover_of(label)];
+    MoverEvidence& count = counts[mover_of(label)];
     ++count.cells;
     count.moved += evidence_[cell] == CellEvidence::Moved ? 1 : 0;
     count.was_there += evidence_[cell] == CellEvidence::Static || evidence_[cell] == CellEvidence::Still ? 1 : 0;
@@ -292,8 +250,8 @@ void DynamicMask::prune(Entry& now) {
     if (label == 0) {
       continue;
     }
-    const Count& count = counts[mover_of(label)];
-    const bool person = movers_[mover_of(label) - 1U].person;
+    const MoverEvidence& count = counts[mover_of(label)];
+    const bool person = movers_[mover_of(label)].person;
     bool leaves = rested(cell) && (!person || count.walks());
     if ((label & kPersonCore) != 0) {
       leaves = leaves && evidence_[cell] == CellEvidence::Static && 2 * count.rested_core < count.core;
@@ -302,18 +260,7 @@ void DynamicMask::prune(Entry& now) {
     }
     label = leaves ? std::uint8_t{0} : label;
   }
-  for (std::size_t i = 0; i < movers_.size(); ++i) {
-    Mover& mover = movers_[i];
-    const Count& count = counts[i + 1];
-    mover.moving = count.moved >= count.needed(kAnyMoved);
-    if (mover.alive && mover.moving) {
-      mover.confirmed_ns = now.stamp_ns;
-      mover.masked = true;
-    } else if (mover.person) {
-      const bool doubtful = static_cast<float>(count.was_there) > kAllStatic * static_cast<float>(count.cells);
-      mover.masked = !doubtful || mover.sure;
-    }
-  }
+  movers_.judge(counts, now.stamp_ns);
 }
 
 /// Cells that have moved and belong to nobody: they go to the mover they touch, or are a new one.
@@ -359,15 +306,14 @@ bool DynamicMask::add_moved(Entry& now) {
         }
       });
     }
-    if (moved < kLeastCells && met == 0) {
+    if (moved < MoverTable::kLeastCells && met == 0) {
       continue;
     }
-    const std::uint8_t id = met != 0 ? met : new_mover();
+    const std::uint8_t id = met != 0 ? met : movers_.add(now.stamp_ns);
     if (id == 0) {
       continue;
     }
-    movers_[id - 1U].confirmed_ns = now.stamp_ns;
-    movers_[id - 1U].moving = true;
+    movers_.moved(id, now.stamp_ns);
     for (const std::uint32_t cell : cells_) {
       now.labels[cell] = id;
     }
@@ -376,24 +322,15 @@ bool DynamicMask::add_moved(Entry& now) {
   return added;
 }
 
-void DynamicMask::forget_dead(const Entry& now) {
-  std::array<std::size_t, kMostMovers + 1> area{};
+void DynamicMask::forget_dead() {
+  Entry& now = newest();
+  MoverTable::PerMover<std::size_t> area{};
   for (const std::uint8_t label : now.labels) {
     ++area[mover_of(label)];
   }
-  bool any_died = false;
-  for (std::size_t i = 0; i < movers_.size(); ++i) {
-    Mover& mover = movers_[i];
-    const double memory_s = config_.memory_s * (mover.sure ? kSureMemory : 1.0);
-    const bool tired = now.stamp_ns - mover.confirmed_ns > from_seconds(memory_s);
-    if (mover.alive && (tired || area[i + 1] < kLeastCells || (mover.strength < 0 && !mover.masked))) {
-      mover = Mover{};
-      any_died = true;
-    }
-  }
-  if (any_died) {
-    for (std::uint8_t& label : newest().labels) {
-      if (label != 0 && !movers_[mover_of(label) - 1U].alive) {
+  if (movers_.forget(area, now.stamp_ns)) {
+    for (std::uint8_t& label : now.labels) {
+      if (label != 0 && !movers_[mover_of(label)].alive) {
         label = 0;
       }
     }
@@ -406,7 +343,7 @@ void DynamicMask::complete() {
   std::size_t count = 0;
   for (std::size_t cell = 0; cell < masked_.size(); ++cell) {
     const std::uint8_t label = now.labels[cell];
-    masked_[cell] = label != 0 && movers_[mover_of(label) - 1U].masked ? 1 : 0;
+    masked_[cell] = label != 0 && movers_[mover_of(label)].masked ? 1 : 0;
     count += masked_[cell];
   }
   for (std::size_t cell = 0; cell < masked_.size(); ++cell) {
@@ -419,11 +356,11 @@ void DynamicMask::complete() {
   summary_.masked_share = static_cast<float>(count) / static_cast<float>(masked_.size());
   summary_.people = 0;
   summary_.others = 0;
-  for (const Mover& mover : movers_) {
-    if (mover.alive && mover.masked) {
+  movers_.for_each([this](const Mover& mover) {
+    if (mover.masked) {
       ++(mover.person ? summary_.people : summary_.others);
     }
-  }
+  });
 }
 
 bool DynamicMask::is_mover(float x, float y, float depth_m) const {

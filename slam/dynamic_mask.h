@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -14,6 +13,7 @@
 #include "slam/depth_grid.h"
 #include "slam/free_space.h"
 #include "slam/mover_labels.h"
+#include "slam/mover_table.h"
 #include "slam/person_segmentation.h"
 
 namespace posed {
@@ -69,15 +69,6 @@ class DynamicMask {
   }
 
  private:
-  struct Mover {
-    bool alive = false;
-    bool person = false;
-    float strength = 0;             // how sure the detector is, added up
-    bool sure = false;              // it was sure once
-    std::int64_t confirmed_ns = 0;  // by a detection, or by its motion
-    bool masked = true;             // false: taken for a false detection, as long as nothing else speaks for it
-    bool moving = true;             // its motion showed in the last frame
-  };
   struct Entry {
     explicit Entry(int width, int height) : depth(width, height), labels(depth.size(), 0) {}
     DepthGrid depth;
@@ -95,10 +86,9 @@ class DynamicMask {
   void carry_to_present(std::size_t frames_back);
   void meet(float score);
   void trim(std::uint8_t id);
-  std::uint8_t new_mover();
   void prune(Entry& now);
   bool add_moved(Entry& now);
-  void forget_dead(const Entry& now);
+  void forget_dead();
   void mask_boxes(const Detections& detections);
   void complete();
 
@@ -108,9 +98,9 @@ class DynamicMask {
   FreeSpace free_space_;
   PersonSegmentation segmentation_;
   MoverCarrier carrier_;
+  MoverTable movers_;
   std::vector<Entry> history_;
   std::size_t taken_ = 0;
-  std::array<Mover, kMostMovers> movers_;
   std::uint64_t last_detection_ = 0;  // sequence number + 1 of the frame; 0: none
   std::vector<CellEvidence> evidence_;
   std::vector<std::uint8_t> carried_;  // one detection on its way to the present
