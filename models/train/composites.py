@@ -213,9 +213,8 @@ def clutter(image: np.ndarray, others: list[np.ndarray], rng: np.random.Generato
             size = rng.uniform(0.04, 0.16) * width
             turn = cv2.getRotationMatrix2D((cut_w / 2, cut_h / 2), rng.uniform(0, 360), size / max(cut_w, cut_h))
             place = middle + rng.normal(0, 0.11, 2) * width
-            turn[:, 2] += size / 2 + 1 - np.array([cut_w, cut_h]) / 2
             side = int(1.5 * size) + 2
-            turn[:, 2] += 0.25 * size
+            turn[:, 2] += 0.75 * size + 1 - np.array([cut_w, cut_h]) / 2  # its middle to that of the square
             thing = cv2.warpAffine(other[y : y + cut_h, x : x + cut_w], turn, (side, side), flags=cv2.INTER_AREA)
             shape = np.full((cut_h, cut_w), 255, np.uint8)
             if rng.random() < 0.4:

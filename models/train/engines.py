@@ -35,11 +35,15 @@ def to_image(boxes: np.ndarray, scale: float, left: int, top: int, shape: tuple[
     return np.clip((boxes - [left, top, left, top]) / scale, 0, [width, height, width, height])
 
 
-def load_checkpoint(path: Path) -> tuple[Yolo, dict]:
-    """The averaged network (EMA) of a checkpoint, ready to look, and all that the checkpoint holds."""
+def read_checkpoint(path: Path) -> dict:
     if not path.is_file():
         raise DataError(f"{path}: no such file")
-    saved = torch.load(path, map_location="cpu")
+    return torch.load(path, map_location="cpu")
+
+
+def load_checkpoint(path: Path) -> tuple[Yolo, dict]:
+    """The averaged network (EMA) of a checkpoint, ready to look, and all that the checkpoint holds."""
+    saved = read_checkpoint(path)
     network = Yolo(NetworkOptions(**saved["options"]))
     network.load_state_dict(saved["ema"])
     return network.eval(), saved

@@ -12,14 +12,9 @@ from pathlib import Path
 import torch
 
 from dataset import DataError
+from engines import read_checkpoint
 
 KEPT = ("options", "anchors", "input", "settings")
-
-
-def load(path: Path) -> dict:
-    if not path.is_file():
-        raise DataError(f"{path}: no such file")
-    return torch.load(path, map_location="cpu")
 
 
 def mean_of(checkpoints: list[tuple[Path, float]]) -> dict:
@@ -27,10 +22,10 @@ def mean_of(checkpoints: list[tuple[Path, float]]) -> dict:
     total = sum(share for _, share in checkpoints)
     if not total > 0 or min(share for _, share in checkpoints) < 0:
         raise DataError(f"shares of {[share for _, share in checkpoints]}: none may be negative, nor all 0")
-    first = load(checkpoints[0][0])
+    read = [read_checkpoint(path) for path, _ in checkpoints]
+    first = read[0]
     sums: dict[str, torch.Tensor] = {}
-    for path, share in checkpoints:
-        saved = load(path)
+    for (path, share), saved in zip(checkpoints, read):
         if saved["options"] != first["options"] or saved["anchors"] != first["anchors"]:
             raise DataError(f"{path}: another network than {checkpoints[0][0]}, or other anchors")
         for name, value in saved["ema"].items():

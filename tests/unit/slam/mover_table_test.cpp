@@ -30,6 +30,19 @@ MoverTable::PerMover<MoverEvidence> everywhere(std::size_t moved, std::size_t wa
   return evidence;
 }
 
+/// A person of whom the detector is sure and one of whom it is not, after its first look at them.
+struct TwoPeople {
+  MoverTable movers{kMemory_s};
+  std::uint8_t sure = movers.add(kStart);
+  std::uint8_t unsure = movers.add(kStart);
+
+  TwoPeople() {
+    movers.looked();
+    movers.found(sure, kSureScore, kStart);
+    movers.found(unsure, kPlainScore, kStart);
+  }
+};
+
 TEST(MoverTable, NumbersAreFromOneOnAndEndWithTheLabels) {
   MoverTable movers(kMemory_s);
   for (std::size_t i = 1; i <= kMostMovers; ++i) {
@@ -61,12 +74,7 @@ TEST(MoverTable, WhatNothingConfirmsIsForgottenAfterItsMemory) {
 }
 
 TEST(MoverTable, TheMemoryOfAPersonWhomTheDetectorWasSureOfIsLonger) {
-  MoverTable movers(kMemory_s);
-  const std::uint8_t sure = movers.add(kStart);
-  const std::uint8_t unsure = movers.add(kStart);
-  movers.looked();
-  movers.found(sure, kSureScore, kStart);
-  movers.found(unsure, kPlainScore, kStart);
+  auto [movers, sure, unsure] = TwoPeople();
   EXPECT_TRUE(movers[sure].sure);
   EXPECT_FALSE(movers[unsure].sure);
   EXPECT_TRUE(movers.forget(all_seen(), after(1.5 * kMemory_s)));
@@ -90,12 +98,7 @@ TEST(MoverTable, PlainLooksAddUpUnlessTooManyMissBetween) {
 }
 
 TEST(MoverTable, APersonWhomTheDetectorIsNotSureOfIsLetGoWhereAllWasThereBefore) {
-  MoverTable movers(kMemory_s);
-  const std::uint8_t sure = movers.add(kStart);
-  const std::uint8_t unsure = movers.add(kStart);
-  movers.looked();
-  movers.found(sure, kSureScore, kStart);
-  movers.found(unsure, kPlainScore, kStart);
+  auto [movers, sure, unsure] = TwoPeople();
   movers.judge(everywhere(0, 80), kStart);
   EXPECT_TRUE(movers[sure].masked);
   EXPECT_FALSE(movers[unsure].masked);
@@ -104,10 +107,7 @@ TEST(MoverTable, APersonWhomTheDetectorIsNotSureOfIsLetGoWhereAllWasThereBefore)
 }
 
 TEST(MoverTable, WhoIsLetGoAndMissedDies) {
-  MoverTable movers(kMemory_s);
-  const std::uint8_t id = movers.add(kStart);
-  movers.looked();
-  movers.found(id, kPlainScore, kStart);
+  auto [movers, sure, id] = TwoPeople();
   movers.judge(everywhere(0, 80), kStart);
   for (int look = 0; look < 10 && movers[id].alive; ++look) {
     movers.looked();
@@ -117,10 +117,7 @@ TEST(MoverTable, WhoIsLetGoAndMissedDies) {
 }
 
 TEST(MoverTable, MotionConfirmsAndMasksAgain) {
-  MoverTable movers(kMemory_s);
-  const std::uint8_t id = movers.add(kStart);
-  movers.looked();
-  movers.found(id, kPlainScore, kStart);
+  auto [movers, sure, id] = TwoPeople();
   movers.judge(everywhere(0, 80), after(1));
   EXPECT_FALSE(movers[id].moving);
   movers.judge(everywhere(10, 80), after(1));
