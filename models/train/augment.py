@@ -42,6 +42,9 @@ AUGMENTATIONS = {
     "near": Augmentation(mosaic=0.2, zoom_crop=0.6, zoom_side=(0.6, 2.0), paste=0.1),
 }
 
+# Of composites, which show people as a robot's camera does: neither mosaics nor turns, and crops that leave them so.
+COMPOSITE = Augmentation(mosaic=0.0, zoom_crop=0.1, scale=(0.75, 1.3), stretch=0.15, quarter_turn=0.0, paste=0.05)
+
 
 def crop_window(sample: Sample, options: Augmentation, rng: np.random.Generator) -> np.ndarray:
     """The part of the image to show (x_min, y_min, x_max, y_max) [pixels]; it may reach beyond the image."""

@@ -171,19 +171,26 @@ def placed(person: CutOut, width: int, height: int, beside: float | None,
 
 
 def composite(background: np.ndarray, people: list[CutOut], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """People into a background, the last one in front; the image and the boxes of what is seen of each. Slivers have none."""
+    """People into a background, the last one in front; the image and their boxes. Slivers have none.
+
+    A box is of all that things leave to be seen of a person, also where other people stand before it: so it stays a person's when two
+    pass. Of whom others hide three quarters or more, it is of what is seen.
+    """
     image = background
     height, width = image.shape[:2]
+    alone: list[np.ndarray] = []
     visible: list[np.ndarray] = []
     middle = None
     for person in people:
         layer, cover, middle = placed(person, width, height, middle, rng)
         image = (image * (1 - cover[..., None]) + layer * cover[..., None]).astype(np.uint8)
         visible = [v & (cover < 0.5) for v in visible] + [cover >= 0.5]
+        alone.append(cover >= 0.5)
     boxes = []
-    for mask in visible:
-        ys, xs = np.nonzero(mask)
-        if len(xs) > 0.015 * height * width:
+    for whole, seen in zip(alone, visible):
+        pixels = seen.sum()
+        if pixels > 0.015 * height * width:
+            ys, xs = np.nonzero(whole if pixels > 0.25 * whole.sum() else seen)
             boxes.append([xs.min(), ys.min(), xs.max() + 1, ys.max() + 1])
     return image, np.array(boxes, float).reshape(-1, 4)
 
@@ -198,6 +205,22 @@ def background_of(sample: Sample, width: int, height: int, rng: np.random.Genera
     return cut[:, ::-1] if rng.random() < 0.5 else cut
 
 
+def cut_thing(image: np.ndarray, size: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A piece of an image, square or round, turned, its longer side of `size` pixels; and which pixels of the result are its own."""
+    height, width = image.shape[:2]
+    w, h = int(rng.integers(16, max(min(width, 160), 17))), int(rng.integers(16, max(min(height, 160), 17)))
+    x, y = rng.integers(max(width - w, 1)), rng.integers(max(height - h, 1))
+    shape = np.full((h, w), 255, np.uint8)
+    if rng.random() < 0.4:
+        shape[:] = 0
+        cv2.ellipse(shape, (w // 2, h // 2), (w // 2, h // 2), 0, 0, 360, 255, -1)
+    side = int(1.5 * size) + 2
+    turn = cv2.getRotationMatrix2D((w / 2, h / 2), rng.uniform(0, 360), size / max(w, h))
+    turn[:, 2] += 0.75 * size + 1 - np.array([w, h]) / 2  # its middle to that of the square
+    thing = cv2.warpAffine(image[y : y + h, x : x + w], turn, (side, side), flags=cv2.INTER_AREA)
+    return thing, cv2.warpAffine(shape, turn, (side, side)) > 127
+
+
 def clutter(image: np.ndarray, others: list[np.ndarray], rng: np.random.Generator) -> np.ndarray:
     """Small things lie about in groups, as on a desk: cut at random from other images. A detector that has seen none takes a heap of
     them for a person."""
@@ -206,22 +229,9 @@ def clutter(image: np.ndarray, others: list[np.ndarray], rng: np.random.Generato
     for _ in range(rng.integers(1, 4)):
         middle = rng.uniform([0.1, 0.3], [0.9, 0.9]) * [width, height]
         for _ in range(rng.integers(3, 16)):
-            other = others[rng.integers(len(others))]
-            h, w = other.shape[:2]
-            cut_w, cut_h = rng.integers(16, max(min(w, 160), 17)), rng.integers(16, max(min(h, 160), 17))
-            x, y = rng.integers(max(w - cut_w, 1)), rng.integers(max(h - cut_h, 1))
-            size = rng.uniform(0.04, 0.16) * width
-            turn = cv2.getRotationMatrix2D((cut_w / 2, cut_h / 2), rng.uniform(0, 360), size / max(cut_w, cut_h))
-            place = middle + rng.normal(0, 0.11, 2) * width
-            side = int(1.5 * size) + 2
-            turn[:, 2] += 0.75 * size + 1 - np.array([cut_w, cut_h]) / 2  # its middle to that of the square
-            thing = cv2.warpAffine(other[y : y + cut_h, x : x + cut_w], turn, (side, side), flags=cv2.INTER_AREA)
-            shape = np.full((cut_h, cut_w), 255, np.uint8)
-            if rng.random() < 0.4:
-                shape[:] = 0
-                cv2.ellipse(shape, (int(cut_w) // 2, int(cut_h) // 2), (int(cut_w) // 2, int(cut_h) // 2), 0, 0, 360, 255, -1)
-            cover = cv2.warpAffine(shape, turn, (side, side)) > 127
-            left, top = (place - side / 2).astype(int)
+            thing, cover = cut_thing(others[rng.integers(len(others))], rng.uniform(0.04, 0.16) * width, rng)
+            side = thing.shape[0]
+            left, top = (middle + rng.normal(0, 0.11, 2) * width - side / 2).astype(int)
             x0, y0, x1, y1 = max(left, 0), max(top, 0), min(left + side, width), min(top + side, height)
             if x1 > x0 and y1 > y0:
                 part = slice(y0 - top, y1 - top), slice(x0 - left, x1 - left)

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 import fused_norm
 from anchors import fit_anchors
-from augment import AUGMENTATIONS, Augmentation, augmented
+from augment import AUGMENTATIONS, COMPOSITE, Augmentation, augmented
 from composites import Compositor, read_cut_outs
 from dataset import DataError, Sample, letterbox, read_folder
 from loss import DetectionLoss
@@ -99,9 +99,10 @@ class Batches(torch.utils.data.Dataset):
         images, targets = [], []
         for i in range(s.batch):
             sample = self.samples[order[(number % per_epoch * s.batch + i) % len(order)]]
+            how = options
             if self.compositor and rng.random() < s.composites:
-                sample = self.compositor.sample(rng)
-            image, labels, boxes = augmented(sample, self.samples, s.width_px, s.height_px, options, rng)
+                sample, how = self.compositor.sample(rng), COMPOSITE
+            image, labels, boxes = augmented(sample, self.samples, s.width_px, s.height_px, how, rng)
             images.append(torch.from_numpy(image[:, :, ::-1].copy()).permute(2, 0, 1))
             for label, (x0, y0, x1, y1) in zip(labels, boxes):
                 targets.append([i, label, (x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0])

@@ -67,6 +67,26 @@ class Composites(unittest.TestCase):
         apart = np.abs(np.array(beside) - 200)
         self.assertTrue(0.4 < ((apart > 0.1 * 60) & (apart < 0.75 * 60)).mean() < 0.75)
 
+    def test_a_box_stays_a_persons_when_another_one_passes_before_it(self):
+        far = CutOut(np.full((200, 80, 3), 150, np.uint8), np.ones((200, 80), np.float32), False)
+        near = CutOut(np.full((200, 80, 3), 255, np.uint8), np.ones((200, 80), np.float32), False)
+        room = np.zeros((120, 160, 3), np.uint8)
+        kept = cut = 0
+        for seed in range(80):
+            alone, boxes = composite(room, [far], np.random.default_rng(seed))
+            both, boxes_of_both = composite(room, [far, near], np.random.default_rng(seed))
+            whole = alone[..., 0] > 0
+            seen = whole & (both == alone).all(2)  # their colours differ
+            if len(boxes) and 0.3 * whole.sum() < seen.sum() < 0.8 * whole.sum() and seen.sum() > 0.02 * seen.size:
+                self.assertEqual(boxes_of_both[0].tolist(), boxes[0].tolist())
+                kept += 1
+            elif len(boxes) and len(boxes_of_both) > 1 and seen.sum() < 0.2 * whole.sum():
+                ys, xs = np.nonzero(seen)
+                self.assertEqual(boxes_of_both[0].tolist(), [xs.min(), ys.min(), xs.max() + 1, ys.max() + 1])
+                cut += 1
+        self.assertGreater(kept, 5)
+        self.assertGreater(cut, 0)
+
     def test_clutter_lies_in_groups_on_what_was_there(self):
         things = [np.full((50, 70, 3), 255, np.uint8), np.full((8, 300, 3), 200, np.uint8)]
         for seed in range(30):
