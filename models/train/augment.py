@@ -32,7 +32,7 @@ class Augmentation:
     occlusion: float = 0.2  # probability of rectangles of other images in front
     least_side: float = 6.0  # [pixels] smaller boxes are not asked for
     least_visible: float = 0.25  # share of a box that must still be seen, unless it is large
-    large_side: float = 64.0  # [pixels] a part so large is a person, whatever the share
+    large_side: float = 40.0  # [pixels] a part so large is a person, whatever the share
 
 
 # `general`: people at all distances. `near`: more of what a robot indoors sees, people who fill half the image or more and are cut by
@@ -42,8 +42,10 @@ AUGMENTATIONS = {
     "near": Augmentation(mosaic=0.2, zoom_crop=0.6, zoom_side=(0.6, 2.0), paste=0.1),
 }
 
-# Of composites, which show people as a robot's camera does: neither mosaics nor turns, and crops that leave them so.
-COMPOSITE = Augmentation(mosaic=0.0, zoom_crop=0.1, scale=(0.75, 1.3), stretch=0.15, quarter_turn=0.0, paste=0.05)
+# Of composites, which show people as a robot's camera does: neither mosaics nor turns, and crops that leave them so. Their boxes are
+# exact, so also what a crop leaves of a person at the image's side is one.
+COMPOSITE = Augmentation(mosaic=0.0, zoom_crop=0.1, scale=(0.75, 1.3), stretch=0.15, quarter_turn=0.0, paste=0.05, least_visible=0.1,
+                         large_side=14.0)
 
 
 def crop_window(sample: Sample, options: Augmentation, rng: np.random.Generator) -> np.ndarray:

@@ -137,8 +137,8 @@ def position_across(w: int, width: int, beside: float | None, rng: np.random.Gen
     """Left edge of a person of width w: beside another one whose middle is given, mostly cut off by a side of the image, or anywhere."""
     if beside is not None and rng.random() < 0.5:
         return beside - 0.5 * w + rng.uniform(0.15, 0.7) * w * rng.choice((-1, 1))
-    if rng.random() < 0.35:
-        seen = rng.uniform(0.15, 0.6) * w
+    if rng.random() < 0.45:
+        seen = rng.uniform(0.1, 0.55) * w
         return seen - w if rng.random() < 0.5 else width - seen
     return rng.uniform(-0.5 * w, width - 0.5 * w)
 
