@@ -184,8 +184,9 @@ def composite(background: np.ndarray, people: list[CutOut], rng: np.random.Gener
     for person in people:
         layer, cover, middle = placed(person, width, height, middle, rng)
         image = (image * (1 - cover[..., None]) + layer * cover[..., None]).astype(np.uint8)
-        visible = [v & (cover < 0.5) for v in visible] + [cover >= 0.5]
-        alone.append(cover >= 0.5)
+        shown = cover >= 0.5
+        visible = [v & ~shown for v in visible] + [shown]
+        alone.append(shown)
     boxes = []
     for whole, seen in zip(alone, visible):
         pixels = seen.sum()

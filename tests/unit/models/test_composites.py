@@ -188,16 +188,15 @@ class Compositors(unittest.TestCase):
         again = compositor.sample(np.random.default_rng(59))
         np.testing.assert_array_equal(again.image, sample.image)
 
-
     def test_stay_whole_and_keep_people_whom_a_side_of_the_image_cuts(self):
         image = np.zeros((240, 320, 3), np.uint8)
         image[40:, :80] = 200
-        composite = Sample(Path("composite"), image, np.zeros(1, np.int64), np.array([[0, 40, 80, 240]], np.float32))
+        person = Sample(Path("composite"), image, np.zeros(1, np.int64), np.array([[0, 40, 80, 240]], np.float32))
         white = Sample(Path("white"), np.full((240, 320, 3), 255, np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
         still = replace(COMPOSITE, paste=0, occlusion=0, hue=0, saturation=0, brightness=0, grey=0, blur=0, noise=0, mirror=0)
         slivers = 0
         for seed in range(300):
-            shown, _, boxes = augmented(composite, [white], 320, 240, still, np.random.default_rng(seed))
+            shown, _, boxes = augmented(person, [white], 320, 240, still, np.random.default_rng(seed))
             self.assertLess(shown.max(), 210)  # nothing of another image, as in a mosaic
             columns = int((shown[..., 0] > 160).any(0).sum())
             self.assertTrue(len(boxes) == 1 or columns < 17, (seed, columns))
