@@ -1,7 +1,9 @@
 """The loss of the raw heads: CIoU of the boxes, binary cross entropy of objectness and classes.
 
 Targets are matched as YOLOv5 does: an anchor is responsible for a box whose sides differ from its own by less than a factor of 4, in
-the cell of the box's centre and in the two neighbours nearest to it.
+the cell of the box's centre and in the two neighbours nearest to it. Otherwise than there, where two boxes claim a cell for the same
+anchor it is that of the nearer centre: asked for both, it would learn a box between them, and of two people who pass each other only the
+one in front would be found.
 """
 from __future__ import annotations
 
@@ -54,6 +56,18 @@ def match_targets(targets: Tensor, anchors: Tensor, height: int, width: int, rat
     return spread[:, 0].long(), anchor, row, column, spread[:, 1].long(), box
 
 
+def nearest_of_each_cell(match: tuple[Tensor, ...], anchors: int, height: int, width: int) -> tuple[Tensor, ...]:
+    """Of all matches (as match_targets gives them) of one image, anchor and cell the one whose centre is nearest to the cell's middle."""
+    image, anchor, row, column, _, box = match
+    place = ((image * anchors + anchor) * height + row) * width + column
+    order = (box[:, :2] - 0.5).norm(dim=1).argsort(stable=True)
+    order = order[place[order].argsort(stable=True)]
+    is_first = torch.ones_like(order, dtype=torch.bool)
+    is_first[1:] = place[order[1:]] != place[order[:-1]]
+    kept = order[is_first]
+    return tuple(m[kept] for m in match)
+
+
 class DetectionLoss(nn.Module):
     """`anchors`: layers x A x 2 [pixels]."""
 
@@ -73,17 +87,15 @@ class DetectionLoss(nn.Module):
             wanted = torch.zeros(values.shape[:4], device=head.device)
             in_cells = targets.clone()
             in_cells[:, 2:] /= stride
-            image, anchor, row, column, label, box = match_targets(in_cells, anchors / stride, height, width, self.weights.anchor_ratio)
+            match = match_targets(in_cells, anchors / stride, height, width, self.weights.anchor_ratio)
+            image, anchor, row, column, label, box = nearest_of_each_cell(match, len(anchors), height, width)
             if len(image):
                 chosen = values[image, anchor, row, column]
                 centre = chosen[:, :2].sigmoid() * 2 - 0.5
                 size = (chosen[:, 2:4].sigmoid() * 2) ** 2 * (anchors / stride)[anchor]
                 overlap = complete_iou(torch.cat((centre, size), 1), box)
                 box_loss = box_loss + (1 - overlap).mean()
-                # Of several boxes in one cell, the best overlap is wanted, whatever the order.
-                score = overlap.detach().clamp(0)
-                order = score.argsort()
-                wanted[image[order], anchor[order], row[order], column[order]] = score[order]
+                wanted[image, anchor, row, column] = overlap.detach().clamp(0)
                 if self.classes > 1:
                     one_hot = functional.one_hot(label, self.classes).float()
                     class_loss = class_loss + functional.binary_cross_entropy_with_logits(chosen[:, 5:], one_hot)

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from boxes import complete_iou, iou_matrix, suppress_overlaps
-from loss import DetectionLoss, match_targets
+from loss import DetectionLoss, match_targets, nearest_of_each_cell
 
 
 class Overlaps(unittest.TestCase):
@@ -64,6 +64,20 @@ class Matching(unittest.TestCase):
         self.assertEqual({c[0] for c in self.match(5.2, 3.7, 7.9, 15.9)[0]}, {0, 1})
         self.assertEqual({c[0] for c in self.match(5.2, 3.7, 8.1, 16.1)[0]}, {1})
         self.assertEqual(self.match(5.2, 3.7, 0.4, 4)[0], [])
+
+
+    def test_a_cell_that_two_boxes_claim_is_that_of_the_nearer_centre(self):
+        left, right = [0.0, 0, 5.2, 3.5, 2, 4], [0.0, 0, 6.1, 3.5, 2.5, 4]
+        elsewhere = [1.0, 0, 5.4, 3.5, 2, 4]  # in another image
+        for targets in ([left, right, elsewhere], [right, elsewhere, left]):
+            found = match_targets(torch.tensor(targets), self.anchors[:1], 10, 12, 4.0)
+            image, _, row, column, _, box = nearest_of_each_cell(found, 1, 10, 12)
+            widths = {(i, c, r): float(b[2]) for i, c, r, b in zip(image.tolist(), column.tolist(), row.tolist(), box)}
+            self.assertEqual(len(widths), len(image))  # each cell once
+            self.assertEqual(sorted(widths), sorted(set(zip(*(m.tolist() for m in (found[0], found[3], found[2]))))))
+            self.assertEqual((widths[0, 5, 3], widths[0, 6, 3], widths[1, 5, 3]), (2.0, 2.5, 2.0))
+        nobody = nearest_of_each_cell(match_targets(torch.zeros(0, 6), self.anchors, 10, 12, 4.0), 2, 10, 12)
+        self.assertEqual(len(nobody[0]), 0)
 
 
 class Loss(unittest.TestCase):
