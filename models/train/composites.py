@@ -17,6 +17,9 @@ from boxes import iou_matrix
 from dataset import DataError, Sample
 
 
+LEAST_SHARE = 0.008  # of the image: of whom less is seen has no box
+
+
 @dataclass
 class CutOut:
     image: np.ndarray  # H x W x 3, 8 bit, blue, green, red
@@ -143,11 +146,11 @@ def position_across(w: int, width: int, beside: float | None, rng: np.random.Gen
     return rng.uniform(-0.5 * w, width - 0.5 * w)
 
 
-def placed(person: CutOut, width: int, height: int, beside: float | None,
+def placed(person: CutOut, width: int, height: int, near: float, beside: float | None,
            rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
-    """The person as a layer of width x height, near and maybe beyond its edges: colours, how much they cover (0 to 1), and where the
-    person's middle is."""
-    wanted = rng.uniform(0.4, 1.3) if person.cut_below else rng.uniform(0.55, 1.7)
+    """The person, the larger the nearer (0 to 1), as a layer of width x height, maybe beyond its edges: colours, how much they cover (0 to
+    1), and where the person's middle is."""
+    wanted = 0.4 + 1.0 * near if person.cut_below else 0.55 + 1.15 * near
     size = min(height * wanted / person.image.shape[0], 1.2 * width / person.image.shape[1])
     look = cv2.resize(person.image, None, fx=size, fy=size, interpolation=cv2.INTER_LINEAR if size > 1 else cv2.INTER_AREA)
     alpha = cv2.resize(person.alpha, (look.shape[1], look.shape[0]), interpolation=cv2.INTER_LINEAR)
@@ -160,7 +163,7 @@ def placed(person: CutOut, width: int, height: int, beside: float | None,
     h, w = alpha.shape
     x = int(position_across(w, width, beside, rng))
     if person.cut_below:
-        highest, lowest = max(height - h, 0), max(height - 0.45 * h, 0.35 * height)
+        highest, lowest = height - h, max(height - 0.45 * h, 0.35 * height)
     else:
         highest, lowest = min(height - h, 0.05 * height), max(height - h, 0.15 * height)
     y = int(rng.uniform(highest, max(highest, lowest)))
@@ -170,8 +173,9 @@ def placed(person: CutOut, width: int, height: int, beside: float | None,
     return layer, hide(cover, rng) if rng.random() < 0.45 else cover, x + 0.5 * w
 
 
-def composite(background: np.ndarray, people: list[CutOut], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """People into a background, the last one in front; the image and their boxes. Slivers have none.
+def composite(background: np.ndarray, people: list[tuple[CutOut, float]], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """People, each with how near (0 to 1), into a background, the last one in front; the image and their boxes. Of whom hardly anything is
+    seen has none.
 
     A box is of all that things leave to be seen of a person, also where other people stand before it: so it stays a person's when two
     pass. Of whom others hide three quarters or more, it is of what is seen.
@@ -181,8 +185,8 @@ def composite(background: np.ndarray, people: list[CutOut], rng: np.random.Gener
     alone: list[np.ndarray] = []
     visible: list[np.ndarray] = []
     middle = None
-    for person in people:
-        layer, cover, middle = placed(person, width, height, middle, rng)
+    for person, near in people:
+        layer, cover, middle = placed(person, width, height, near, middle, rng)
         image = (image * (1 - cover[..., None]) + layer * cover[..., None]).astype(np.uint8)
         shown = cover >= 0.5
         visible = [v & ~shown for v in visible] + [shown]
@@ -190,7 +194,7 @@ def composite(background: np.ndarray, people: list[CutOut], rng: np.random.Gener
     boxes = []
     for whole, seen in zip(alone, visible):
         pixels = seen.sum()
-        if pixels > 0.015 * height * width:
+        if pixels > LEAST_SHARE * height * width:
             ys, xs = np.nonzero(whole if pixels > 0.25 * whole.sum() else seen)
             boxes.append([xs.min(), ys.min(), xs.max() + 1, ys.max() + 1])
     return image, np.array(boxes, float).reshape(-1, 4)
@@ -253,6 +257,8 @@ class Compositor:
         background = background_of(self.backgrounds[rng.integers(len(self.backgrounds))], self.width, self.height, rng)
         if rng.random() < 0.4:
             background = clutter(background, [self.backgrounds[i].image for i in rng.integers(len(self.backgrounds), size=8)], rng)
-        count = rng.choice(4, p=[0.15, 0.5, 0.25, 0.1])
-        image, boxes = composite(background, [self.people[rng.integers(len(self.people))] for _ in range(count)], rng)
+        people = [self.people[i] for i in rng.integers(len(self.people), size=rng.choice(4, p=[0.08, 0.42, 0.38, 0.12]))]
+        if len(people) > 1 and rng.random() < 0.3:  # in the same clothes
+            people[1] = people[0]
+        image, boxes = composite(background, list(zip(people, np.sort(rng.random(len(people)) ** 0.7))), rng)
         return Sample(Path("composite"), image, np.zeros(len(boxes), np.int64), boxes.astype(np.float32))

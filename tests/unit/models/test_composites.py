@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from augment import COMPOSITE, augmented
-from composites import Compositor, CutOut, background_of, clutter, composite, cut_by_mask, cut_out, hide, position_across, ragged, read_cut_outs
+from composites import LEAST_SHARE, Compositor, CutOut, background_of, clutter, composite, cut_by_mask, cut_out, hide, placed, position_across, ragged, read_cut_outs
 from dataset import DataError, Sample
 
 
@@ -44,9 +44,9 @@ class Composites(unittest.TestCase):
     def test_boxes_hold_what_is_seen_and_nothing_else(self):
         person = CutOut(np.full((200, 80, 3), 255, np.uint8), np.ones((200, 80), np.float32), False)
         for seed in range(40):
-            image, boxes = composite(np.zeros((120, 160, 3), np.uint8), [person], np.random.default_rng(seed))
+            image, boxes = composite(np.zeros((120, 160, 3), np.uint8), [(person, 0.5)], np.random.default_rng(seed))
             bright = image[..., 0] > 120
-            self.assertEqual(len(boxes), int(bright.sum() > 0.015 * bright.size))
+            self.assertEqual(len(boxes), int(bright.sum() > LEAST_SHARE * bright.size))
             for x0, y0, x1, y1 in boxes.astype(int):
                 self.assertEqual(int(bright.sum()), int(bright[y0:y1, x0:x1].sum()))
                 self.assertTrue(bright[y0:y1, x0].any() and bright[y0:y1, x1 - 1].any())
@@ -56,7 +56,7 @@ class Composites(unittest.TestCase):
         person = CutOut(np.full((100, 60, 3), 255, np.uint8), np.ones((100, 60), np.float32), True)
         reached = 0
         for seed in range(40):
-            _, boxes = composite(np.zeros((120, 160, 3), np.uint8), [person], np.random.default_rng(seed))
+            _, boxes = composite(np.zeros((120, 160, 3), np.uint8), [(person, 0.5)], np.random.default_rng(seed))
             reached += sum(int(box[3] == 120) for box in boxes)
         self.assertGreater(reached, 20)  # the others stand behind a desk
 
@@ -69,14 +69,25 @@ class Composites(unittest.TestCase):
         apart = np.abs(np.array(beside) - 200)
         self.assertTrue(0.4 < ((apart > 0.1 * 60) & (apart < 0.75 * 60)).mean() < 0.75)
 
+    def test_the_nearer_a_person_the_larger_and_the_nearest_may_lose_the_head(self):
+        upper_body = CutOut(np.full((200, 100, 3), 255, np.uint8), np.ones((200, 100), np.float32), True)
+        widths, tops = [], []
+        for near in (0.0, 0.5, 1.0):
+            covers = [placed(upper_body, 320, 240, near, 160.0, np.random.default_rng(seed))[1] > 0.5 for seed in range(30)]
+            widths.append(max(int(c.any(0).sum()) for c in covers))
+            tops.append(sum(bool(c[0].any()) for c in covers))
+        self.assertEqual(widths, sorted(set(widths)))
+        self.assertEqual(tops[0], 0)
+        self.assertTrue(3 < tops[2] < 30)
+
     def test_a_box_stays_a_persons_when_another_one_passes_before_it(self):
         far = CutOut(np.full((200, 80, 3), 150, np.uint8), np.ones((200, 80), np.float32), False)
         near = CutOut(np.full((200, 80, 3), 255, np.uint8), np.ones((200, 80), np.float32), False)
         room = np.zeros((120, 160, 3), np.uint8)
         kept = cut = 0
         for seed in range(80):
-            alone, boxes = composite(room, [far], np.random.default_rng(seed))
-            both, boxes_of_both = composite(room, [far, near], np.random.default_rng(seed))
+            alone, boxes = composite(room, [(far, 0.3)], np.random.default_rng(seed))
+            both, boxes_of_both = composite(room, [(far, 0.3), (near, 0.4)], np.random.default_rng(seed))
             whole = alone[..., 0] > 0
             seen = whole & (both == alone).all(2)  # their colours differ
             if len(boxes) and 0.3 * whole.sum() < seen.sum() < 0.8 * whole.sum() and seen.sum() > 0.02 * seen.size:
