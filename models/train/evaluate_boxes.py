@@ -8,8 +8,9 @@ false: nobody is there.
 
 Truth boxes may reach over what hides a person. With --masks, the folder of images NAME.png that are not zero where somebody is seen,
 --least-area is about the pixels of the mask in the box, and people of whom less than --least-visible of the box is seen count neither as
-missed nor as found. The mask is everybody's: who stands behind another person counts as seen. --ignored names boxes, in the format of
-those found, that are neither right nor wrong: people of whom the truth does not speak.
+missed nor as found. Such a mask is everybody's: who stands behind another person counts as seen. With --masks-by-person a pixel's value is
+whose it is: 1 for the first of the truth's lines of that image, 2 for the second, 0 for nobody; what others hide of a person then does not
+count. --ignored names boxes, in the format of those found, that are neither right nor wrong: people of whom the truth does not speak.
 """
 from __future__ import annotations
 
@@ -25,6 +26,9 @@ from boxes import iou_matrix
 from dataset import DataError, read_folder
 from evaluate import at_scores
 from metrics import AveragePrecision
+
+
+IGNORED_OVERLAP = 0.3
 
 
 def read_rows(path: Path, columns: int) -> dict[str, list[list[float]]]:
@@ -81,6 +85,7 @@ class Measure:
     masks: Path | None = None
     least_visible: float = 0.25
     others_empty: bool = False
+    masks_by_person: bool = False
 
     def counted(self, name: str, boxes: np.ndarray) -> np.ndarray:
         if self.masks is None:
@@ -88,13 +93,19 @@ class Measure:
         mask = cv2.imread(str(self.masks / f"{name}.png"), cv2.IMREAD_GRAYSCALE)
         if mask is None:
             raise DataError(f"{self.masks / name}.png: no mask that can be read")
-        seen = visible_pixels(boxes, mask)
+        if self.masks_by_person and mask.max() > len(boxes):
+            raise DataError(f"{self.masks / name}.png: a pixel of person {mask.max()}, where the truth has {len(boxes)}")
+        if self.masks_by_person:
+            seen = np.array([visible_pixels(box[None], mask == i)[0] for i, box in enumerate(boxes, 1)])
+        else:
+            seen = visible_pixels(boxes, mask)
         return (seen >= self.least_area) & (seen >= self.least_visible * area(boxes))
 
 
 def compare(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], measure: Measure,
             ignored: dict[str, list[list[float]]] | None = None) -> AveragePrecision:
-    """Boxes that lie by half or more in an ignored one, and on nobody who counts, are left out."""
+    """Boxes on nobody who counts are left out where they lie by half or more in an ignored one, or overlap one by IGNORED_OVERLAP: of whom
+    the truth does not speak, it does not say either how far the box should reach behind what hides them."""
     unknown = sorted(set(found) - set(truth))
     if measure.others_empty:
         truth = truth | {name: np.zeros((0, 4)) for name in unknown}
@@ -108,6 +119,7 @@ def compare(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], m
         on_others = iou_matrix(rows[:, 1:], boxes[~counted]).max(1, initial=0) >= measure.overlap
         left_out = np.array((ignored or {}).get(name, []), float).reshape(-1, 5)[:, 1:]
         on_ignored = share_within(rows[:, 1:], left_out) >= 0.5
+        on_ignored |= iou_matrix(rows[:, 1:], left_out).max(1, initial=0) >= IGNORED_OVERLAP
         kept = on_counted | (~on_others & ~on_ignored & (area(rows[:, 1:]) >= measure.least_area))
         ap.add(rows[kept, 1:], rows[kept, 0], boxes[counted])
     return ap
@@ -121,12 +133,15 @@ def main() -> int:
     parser.add_argument("--least-area", type=float, default=0.0, help="[pixels^2] smaller people are left out")
     parser.add_argument("--masks", type=Path, help="folder of NAME.png, not zero where somebody is seen")
     parser.add_argument("--least-visible", type=float, default=0.25, help="share of the box; with --masks, people seen less are left out")
+    parser.add_argument("--masks-by-person", action="store_true", help="a pixel of the masks is the number of its person, not just not zero")
     parser.add_argument("--ignored", type=Path, help="lines as of the boxes found; what is found there is left out")
     parser.add_argument("--others-empty", action="store_true", help="images that the truth does not name show nobody")
     args = parser.parse_args()
+    if args.masks_by_person and not args.masks:
+        parser.error("--masks-by-person says what --masks are")
     try:
         truth = read_truth(args.truth)
-        measure = Measure(args.overlap, args.least_area, args.masks, args.least_visible, args.others_empty)
+        measure = Measure(args.overlap, args.least_area, args.masks, args.least_visible, args.others_empty, args.masks_by_person)
         ap = compare(read_rows(args.found, 5), truth, measure, read_rows(args.ignored, 5) if args.ignored else None)
     except DataError as error:
         print(f"evaluate_boxes.py: {error}")

@@ -72,6 +72,23 @@ class EvaluateBoxes(unittest.TestCase):
         self.assertEqual(compare({}, truth, Measure(masks=masks, least_area=5000)).truths, 1)
         self.assertEqual(compare({}, truth, Measure(masks=masks, least_area=5001)).truths, 0)
 
+    def test_what_others_hide_of_a_person_does_not_count_where_masks_tell_people_apart(self):
+        truth = read_truth(self.file("people.txt", "a 0 0 99 99\na 50 0 149 99\n"))
+        image = np.zeros((200, 400), np.uint8)
+        image[:100, :50], image[:100, 50:150] = 1, 2  # the second one in front
+        path = Path(self.folder.name) / "a.png"
+        cv2.imwrite(str(path), image)
+        found = {"a": [[0.9, 50, 0, 149, 99], [0.8, 0, 0, 99, 99]]}
+        by_person = Measure(masks=path.parent, masks_by_person=True, least_visible=0.6)
+        self.assertEqual(compare(found, truth, Measure(masks=path.parent, least_visible=0.6)).truths, 2)
+        ap = compare(found, truth, by_person)
+        self.assertEqual((ap.truths, ap.hits, ap.scores), (1, [True], [0.9]))
+        self.assertEqual(compare({}, truth, Measure(masks=path.parent, masks_by_person=True, least_area=5001, least_visible=0)).truths, 1)
+        image[199, 399] = 3
+        cv2.imwrite(str(path), image)
+        with self.assertRaisesRegex(DataError, "a.png: a pixel of person 3, where the truth has 2"):
+            compare(found, truth, by_person)
+
     def test_a_mask_that_is_not_there_is_named(self):
         truth = read_truth(self.file("people.txt", "lost 0 0 99 99\n"))
         with self.assertRaisesRegex(DataError, "lost.png"):
@@ -83,6 +100,12 @@ class EvaluateBoxes(unittest.TestCase):
         found = {"a": [[0.9, 0, 0, 100, 100], [0.8, 10, 120, 60, 180], [0.7, 60, 120, 141, 180]]}
         ap = compare(found, truth, Measure(), ignored)
         self.assertEqual((ap.hits, ap.scores), ([True, False], [0.9, 0.7]))
+
+    def test_a_box_that_reaches_beyond_an_ignored_one_is_left_out_where_it_is_of_the_same(self):
+        head_and_shirt = read_rows(self.file("ignored.txt", "a 0.9 100 0 200 100\n"), 5)
+        found = {"a": [[0.9, 100, 0, 200, 300], [0.8, 100, 0, 200, 400], [0.7, 0, 0, 300, 200]]}
+        ap = compare(found, {"a": np.zeros((0, 4))}, Measure(), head_and_shirt)
+        self.assertEqual(ap.scores, [0.8, 0.7])
 
 
 if __name__ == "__main__":
