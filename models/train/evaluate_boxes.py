@@ -28,7 +28,7 @@ from evaluate import at_scores
 from metrics import AveragePrecision
 
 
-IGNORED_OVERLAP = 0.3
+IGNORED_OVERLAP = 0.3  # intersection over union with an ignored box, from which on a box is of the same person
 
 
 def read_rows(path: Path, columns: int) -> dict[str, list[list[float]]]:
@@ -93,12 +93,12 @@ class Measure:
         mask = cv2.imread(str(self.masks / f"{name}.png"), cv2.IMREAD_GRAYSCALE)
         if mask is None:
             raise DataError(f"{self.masks / name}.png: no mask that can be read")
-        if self.masks_by_person and mask.max() > len(boxes):
-            raise DataError(f"{self.masks / name}.png: a pixel of person {mask.max()}, where the truth has {len(boxes)}")
-        if self.masks_by_person:
+        if not self.masks_by_person:
+            seen = visible_pixels(boxes, mask)
+        elif mask.max() <= len(boxes):
             seen = np.array([visible_pixels(box[None], mask == i)[0] for i, box in enumerate(boxes, 1)])
         else:
-            seen = visible_pixels(boxes, mask)
+            raise DataError(f"{self.masks / name}.png: a pixel of person {mask.max()}, where the truth has {len(boxes)}")
         return (seen >= self.least_area) & (seen >= self.least_visible * area(boxes))
 
 

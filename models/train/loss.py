@@ -2,8 +2,7 @@
 
 Targets are matched as YOLOv5 does: an anchor is responsible for a box whose sides differ from its own by less than a factor of 4, in
 the cell of the box's centre and in the two neighbours nearest to it. Otherwise than there, where two boxes claim a cell for the same
-anchor it is that of the nearer centre: asked for both, it would learn a box between them, and of two people who pass each other only the
-one in front would be found.
+anchor it is that of the nearer centre: asked for both, it would learn a box between them.
 """
 from __future__ import annotations
 

@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 
 from augment import COMPOSITE, augmented
-from composites import LEAST_SHARE, Compositor, CutOut, background_of, clutter, composite, cut_by_mask, cut_out, hide, placed, position_across, ragged, read_cut_outs
+from composites import (LEAST_SHARE, Compositor, CutOut, background_of, clutter, composite, cut_by_mask, cut_out, hide, placed, position_across,
+                        ragged, read_cut_outs)
 from dataset import DataError, Sample
 
 

@@ -65,7 +65,6 @@ class Matching(unittest.TestCase):
         self.assertEqual({c[0] for c in self.match(5.2, 3.7, 8.1, 16.1)[0]}, {1})
         self.assertEqual(self.match(5.2, 3.7, 0.4, 4)[0], [])
 
-
     def test_a_cell_that_two_boxes_claim_is_that_of_the_nearer_centre(self):
         left, right = [0.0, 0, 5.2, 3.5, 2, 4], [0.0, 0, 6.1, 3.5, 2.5, 4]
         elsewhere = [1.0, 0, 5.4, 3.5, 2, 4]  # in another image
