@@ -14,6 +14,8 @@ namespace posed {
 namespace {
 
 constexpr int kBoxValues = 5;  // x, y, width, height, objectness
+/// How far from the cell's middle the centre of an anchor's first and second box may be [cells].
+constexpr std::array<float, 2> kCentreReach{1.0F, 2.0F};
 constexpr std::array<int, 3> kYoloxStrides{8, 16, 32};
 constexpr std::size_t kMaxCandidates = 1000;  // that are compared with each other
 
@@ -63,14 +65,21 @@ Status BoxDecoder::check_anchors(std::span<const InferenceOutput> outputs, const
     const std::vector<int>& d = outputs[i].dimensions;
     const int stride = metadata.strides[i];
     const int anchors = static_cast<int>(metadata.anchors[i].size());
-    if (anchors == 0 || stride <= 0 || d.size() != 4 || d[0] != 1 || d[1] % anchors != 0 || d[1] / anchors <= kBoxValues ||
-        d[2] != input_.height / stride || d[3] != input_.width / stride || (i > 0 && d[1] / anchors != classes_ + kBoxValues)) {
-      return make_error(ErrorCode::BadData,
-                        fmt::format("output {} has the shape {}, which {} anchors and stride {} of an input {} x {} do not explain",
-                                    i, fmt::join(d, " x "), anchors, stride, input_.width, input_.height));
+    const int boxes = anchors * metadata.boxes_per_anchor;
+    if (boxes <= 0 || stride <= 0 || d.size() != 4 || d[0] != 1 || d[1] % boxes != 0 || d[1] / boxes <= kBoxValues ||
+        d[2] != input_.height / stride || d[3] != input_.width / stride || (i > 0 && d[1] / boxes != classes_ + kBoxValues)) {
+      return make_error(
+          ErrorCode::BadData,
+          fmt::format("output {} has the shape {}, which {} anchors of {} boxes and stride {} of an input {} x {} "
+                      "do not explain",
+                      i, fmt::join(d, " x "), anchors, metadata.boxes_per_anchor, stride, input_.width, input_.height));
     }
-    classes_ = d[1] / anchors - kBoxValues;
+    classes_ = d[1] / boxes - kBoxValues;
   }
+  if (metadata.boxes_per_anchor > static_cast<int>(kCentreReach.size())) {
+    return make_error(ErrorCode::BadData, fmt::format("{} boxes an anchor; there may be 1 or 2", metadata.boxes_per_anchor));
+  }
+  boxes_per_anchor_ = metadata.boxes_per_anchor;
   strides_ = metadata.strides;
   anchors_ = metadata.anchors;
   return {};
@@ -97,26 +106,31 @@ Status BoxDecoder::check_rows(std::span<const InferenceOutput> outputs) {
   return {};
 }
 
-void BoxDecoder::decode(std::span<const InferenceOutput> outputs, float score, std::vector<Detection>& found) const {
+void BoxDecoder::decode(std::span<const InferenceOutput> outputs, float score, std::vector<Candidate>& found) const {
   found.clear();
   if (kind_ == HeadKind::Anchors) {
+    std::size_t first_place = 0;
     for (std::size_t head = 0; head < outputs.size(); ++head) {
-      decode_anchors(outputs[head], head, score, found);
+      decode_anchors(outputs[head], head, first_place, score, found);
+      first_place += outputs[head].values.size();  // more than it has places
     }
   } else {
     decode_rows(outputs[0], score, found);
   }
-  std::erase_if(found, [](const Detection& d) { return !is_finite(d.box) || d.box.area() <= 0; });
+  std::erase_if(found, [](const Candidate& c) { return !is_finite(c.detection.box) || c.detection.box.area() <= 0; });
 }
 
-void BoxDecoder::decode_anchors(const InferenceOutput& output, std::size_t head, float score, std::vector<Detection>& found) const {
-  const int height = output.dimensions[2];
-  const int width = output.dimensions[3];
-  const auto plane = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+void BoxDecoder::decode_anchors(const InferenceOutput& output, std::size_t head, std::size_t first_place, float score,
+                                std::vector<Candidate>& found) const {
+  const auto width = static_cast<std::size_t>(output.dimensions[3]);
+  const std::size_t plane = width * static_cast<std::size_t>(output.dimensions[2]);
   const auto stride = static_cast<float>(strides_[head]);
+  const auto per_anchor = static_cast<std::size_t>(boxes_per_anchor_);
   const float raw_score = logit(score);  // the score is at most the objectness: most cells need no sigmoid
-  for (std::size_t a = 0; a < anchors_[head].size(); ++a) {
-    const float* const base = output.values.data() + a * static_cast<std::size_t>(kBoxValues + classes_) * plane;
+  for (std::size_t box = 0; box < anchors_[head].size() * per_anchor; ++box) {
+    const Anchor& anchor = anchors_[head][box / per_anchor];
+    const float reach = kCentreReach[box % per_anchor];
+    const float* const base = output.values.data() + box * static_cast<std::size_t>(kBoxValues + classes_) * plane;
     for (std::size_t cell = 0; cell < plane; ++cell) {
       const auto value = [&](int k) { return base[static_cast<std::size_t>(k) * plane + cell]; };
       if (!(value(4) >= raw_score)) {
@@ -126,19 +140,17 @@ void BoxDecoder::decode_anchors(const InferenceOutput& output, std::size_t head,
       if (confidence < score) {
         continue;
       }
-      const auto column = static_cast<float>(cell % static_cast<std::size_t>(width));
-      const auto row = static_cast<float>(cell / static_cast<std::size_t>(width));
+      const float x = reach * (2.0F * sigmoid(value(0)) - 1.0F) + 0.5F + static_cast<float>(cell % width);
+      const float y = reach * (2.0F * sigmoid(value(1)) - 1.0F) + 0.5F + static_cast<float>(cell / width);
       const float w = 2.0F * sigmoid(value(2));
       const float h = 2.0F * sigmoid(value(3));
-      found.push_back(
-          {centred_box((2.0F * sigmoid(value(0)) - 0.5F + column) * stride, (2.0F * sigmoid(value(1)) - 0.5F + row) * stride,
-                       w * w * anchors_[head][a].width, h * h * anchors_[head][a].height),
-           confidence});
+      found.push_back({{centred_box(x * stride, y * stride, w * w * anchor.width, h * h * anchor.height), confidence},
+                       first_place + (box / per_anchor) * plane + cell});
     }
   }
 }
 
-void BoxDecoder::decode_rows(const InferenceOutput& output, float score, std::vector<Detection>& found) const {
+void BoxDecoder::decode_rows(const InferenceOutput& output, float score, std::vector<Candidate>& found) const {
   const auto boxes = static_cast<std::size_t>(output.dimensions[1]);
   const auto row_size = static_cast<std::size_t>(output.dimensions[2]);
   std::size_t level = 0;
@@ -148,7 +160,7 @@ void BoxDecoder::decode_rows(const InferenceOutput& output, float score, std::ve
     if (kind_ == HeadKind::Boxes) {
       const float confidence = v[4] * (classes_ == 1 ? 1.0F : v[kBoxValues + wanted_]);
       if (confidence >= score) {
-        found.push_back({centred_box(v[0], v[1], v[2], v[3]), confidence});
+        found.push_back({{centred_box(v[0], v[1], v[2], v[3]), confidence}, i});
       }
       continue;
     }
@@ -167,23 +179,27 @@ void BoxDecoder::decode_rows(const InferenceOutput& output, float score, std::ve
       const auto column = static_cast<float>((i - level_begin) % width);
       const auto row = static_cast<float>((i - level_begin) / width);
       found.push_back(
-          {centred_box((v[0] + column) * stride, (v[1] + row) * stride, std::exp(v[2]) * stride, std::exp(v[3]) * stride),
-           confidence});
+          {{centred_box((v[0] + column) * stride, (v[1] + row) * stride, std::exp(v[2]) * stride, std::exp(v[3]) * stride),
+            confidence},
+           i});
     }
   }
 }
 
-void suppress_overlaps(std::vector<Detection>& found, float iou, std::size_t limit) {
-  const auto order = [](const Detection& d) {
-    return std::make_tuple(-d.score, d.box.x_min, d.box.y_min, d.box.x_max, d.box.y_max);
+void suppress_overlaps(std::vector<Candidate>& found, float iou, std::size_t limit) {
+  const auto order = [](const Candidate& c) {
+    const BoundingBox& box = c.detection.box;
+    return std::make_tuple(-c.detection.score, box.x_min, box.y_min, box.x_max, box.y_max, c.place);
   };
-  std::sort(found.begin(), found.end(), [&](const Detection& a, const Detection& b) { return order(a) < order(b); });
+  std::sort(found.begin(), found.end(), [&](const Candidate& a, const Candidate& b) { return order(a) < order(b); });
   found.resize(std::min(found.size(), kMaxCandidates));
   std::size_t kept = 0;
   for (std::size_t i = 0; i < found.size() && kept < limit; ++i) {
-    const Detection candidate = found[i];
-    const auto end = found.begin() + static_cast<std::ptrdiff_t>(kept);
-    if (std::none_of(found.begin(), end, [&](const Detection& d) { return intersection_over_union(d.box, candidate.box) > iou; })) {
+    const Candidate candidate = found[i];
+    const auto goes_for = [&](const Candidate& c) {
+      return c.place != candidate.place && intersection_over_union(c.detection.box, candidate.detection.box) > iou;
+    };
+    if (std::none_of(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), goes_for)) {
       found[kept++] = candidate;
     }
   }

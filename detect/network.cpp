@@ -220,6 +220,9 @@ std::string check_metadata(const NetworkMetadata& metadata, const TensorShape& i
   if (metadata.classes.empty()) {
     return "no classes, but strides and anchors";
   }
+  if (metadata.boxes_per_anchor < 1 || metadata.boxes_per_anchor > 2) {
+    return fmt::format("{} boxes an anchor; there may be 1 or 2", metadata.boxes_per_anchor);
+  }
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const int stride = metadata.strides[i];
     const TensorShape& output = outputs[i];
@@ -227,10 +230,11 @@ std::string check_metadata(const NetworkMetadata& metadata, const TensorShape& i
       return fmt::format("output {} is {}, which stride {} does not make of an input of {}", i, to_text(output), stride,
                          to_text(input));
     }
-    const std::size_t channels = metadata.anchors[i].size() * (5 + metadata.classes.size());
+    const std::size_t boxes = metadata.anchors[i].size() * static_cast<std::size_t>(metadata.boxes_per_anchor);
+    const std::size_t channels = boxes * (5 + metadata.classes.size());
     if (metadata.anchors[i].empty() || channels != static_cast<std::size_t>(output.channels)) {
-      return fmt::format("output {} is {}, but {} anchors of {} classes take {} channels", i, to_text(output),
-                         metadata.anchors[i].size(), metadata.classes.size(), channels);
+      return fmt::format("output {} is {}, but {} anchors of {} boxes and {} classes take {} channels", i, to_text(output),
+                         metadata.anchors[i].size(), metadata.boxes_per_anchor, metadata.classes.size(), channels);
     }
     for (const Anchor& anchor : metadata.anchors[i]) {
       if (!(anchor.width > 0) || !(anchor.height > 0) || !std::isfinite(anchor.width) || !std::isfinite(anchor.height)) {

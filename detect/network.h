@@ -40,6 +40,7 @@ struct NetworkMetadata {
   std::vector<std::string> classes;
   std::vector<int> strides;                  ///< of each output [pixels of the network's input]
   std::vector<std::vector<Anchor>> anchors;  ///< of each output
+  int boxes_per_anchor = 1;                  ///< 1 or 2; the second one is of somebody who overlaps another person
 };
 
 /// The values that a tensor takes, from calibration (detect/calibration.h).

@@ -21,6 +21,8 @@ namespace posed {
 namespace {
 
 constexpr std::string_view kMagic = "POSEDNET";
+constexpr std::uint32_t kOldestVersion = 1;
+constexpr std::uint32_t kVersionWithBoxesPerAnchor = 2;
 constexpr std::size_t kHeadBytes = 20;
 constexpr std::size_t kChecksumBytes = 4;
 constexpr std::uint32_t kMaxListLength = 1 << 16;
@@ -266,6 +268,11 @@ Operation operation_of_kind(std::size_t kind) {
   }
 }
 
+/// The oldest version that can hold the network: what needs nothing new can be read by an older posed.
+std::uint32_t version_for(const Network& network) {
+  return network.metadata().boxes_per_anchor == 1 ? kOldestVersion : kVersionWithBoxesPerAnchor;
+}
+
 void write_body(const Network& network, WeightFormat format, ByteWriter& out) {
   const NetworkMetadata& metadata = network.metadata();
   const auto write_integer = [&](int value) { out.integer(value); };
@@ -278,6 +285,9 @@ void write_body(const Network& network, WeightFormat format, ByteWriter& out) {
       out.real(anchor.height);
     });
   });
+  if (version_for(network) >= kVersionWithBoxesPerAnchor) {
+    out.integer(metadata.boxes_per_anchor);
+  }
   for (const int value : {network.input().channels, network.input().height, network.input().width}) {
     out.integer(value);
   }
@@ -294,7 +304,7 @@ void write_body(const Network& network, WeightFormat format, ByteWriter& out) {
   });
 }
 
-Result<Network> read_body(ByteReader& in, const std::string& source) {
+Result<Network> read_body(ByteReader& in, std::uint32_t version, const std::string& source) {
   const auto read_integer = [&] { return in.integer(); };
   NetworkMetadata metadata;
   metadata.name = in.text();
@@ -306,6 +316,9 @@ Result<Network> read_body(ByteReader& in, const std::string& source) {
       return Anchor{width, in.real()};
     });
   });
+  if (version >= kVersionWithBoxesPerAnchor) {
+    metadata.boxes_per_anchor = in.integer();
+  }
   TensorShape input;
   input.channels = in.integer();
   input.height = in.integer();
@@ -335,8 +348,13 @@ Result<Network> read_body(ByteReader& in, const std::string& source) {
   return network;
 }
 
+struct Body {
+  std::uint32_t version = 0;
+  std::span<const std::uint8_t> bytes;
+};
+
 /// The body of a file whose head, length and checksum are right.
-Result<std::span<const std::uint8_t>> checked_body(std::span<const std::uint8_t> bytes, const std::string& source) {
+Result<Body> checked_body(std::span<const std::uint8_t> bytes, const std::string& source) {
   const auto damaged = [&](std::string_view what) {
     return make_error(ErrorCode::BadData,
                       fmt::format("{}: is a damaged network file: {}. Restore a copy of it or convert it again", source, what));
@@ -349,11 +367,12 @@ Result<std::span<const std::uint8_t>> checked_body(std::span<const std::uint8_t>
     return damaged("it ends early");
   }
   ByteReader head(bytes.subspan(kMagic.size()));
-  if (const auto version = head.number<std::uint32_t>(); version != kNetworkFormatVersion) {
+  const auto version = head.number<std::uint32_t>();
+  if (version < kOldestVersion || version > kNetworkFormatVersion) {
     return make_error(ErrorCode::Unsupported,
-                      fmt::format("{}: is of format version {}, which this posed cannot read; it reads version {}. "
+                      fmt::format("{}: is of format version {}, which this posed cannot read; it reads versions {} to {}. "
                                   "Convert the network again with this posed",
-                                  source, version, kNetworkFormatVersion));
+                                  source, version, kOldestVersion, kNetworkFormatVersion));
   }
   const auto body_bytes = head.number<std::uint64_t>();
   if (body_bytes != bytes.size() - kHeadBytes - kChecksumBytes) {
@@ -362,7 +381,7 @@ Result<std::span<const std::uint8_t>> checked_body(std::span<const std::uint8_t>
   if (ByteReader(bytes.last(kChecksumBytes)).number<std::uint32_t>() != crc32c(bytes.first(bytes.size() - kChecksumBytes))) {
     return damaged("its checksum is wrong");
   }
-  return bytes.subspan(kHeadBytes, body_bytes);
+  return Body{version, bytes.subspan(kHeadBytes, body_bytes)};
 }
 
 }  // namespace
@@ -382,7 +401,7 @@ Status write_network(const Network& network, WeightFormat format, const std::fil
   for (const char letter : kMagic) {
     head.number(static_cast<std::uint8_t>(letter));
   }
-  head.number(kNetworkFormatVersion);
+  head.number(version_for(*simple));
   head.number(static_cast<std::uint64_t>(body.bytes().size()));
   ByteWriter checksum;
   checksum.number(crc32c(body.bytes(), crc32c(head.bytes())));
@@ -400,13 +419,13 @@ Status write_network(const Network& network, WeightFormat format, const std::fil
 }
 
 Result<Network> parse_network(std::span<const std::uint8_t> bytes, const std::string& source) {
-  const Result<std::span<const std::uint8_t>> body = checked_body(bytes, source);
+  const Result<Body> body = checked_body(bytes, source);
   if (!body) {
     return tl::unexpected<Error>(body.error());
   }
   try {
-    ByteReader reader(*body);
-    return read_body(reader, source);
+    ByteReader reader(body->bytes);
+    return read_body(reader, body->version, source);
   } catch (const Refusal& refusal) {
     return make_error(ErrorCode::BadData, fmt::format("{}: is a damaged network file: {}", source, refusal.what));
   }

@@ -17,7 +17,7 @@
 /// floats.
 namespace posed {
 
-constexpr std::uint32_t kNetworkFormatVersion = 1;
+constexpr std::uint32_t kNetworkFormatVersion = 2;  ///< the newest; version 1 knows one box an anchor and is read as well
 
 enum class WeightFormat : std::uint8_t { Float32 = 0, Float16 = 1, Int8 = 2 };
 

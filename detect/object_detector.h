@@ -45,7 +45,8 @@ class ObjectDetector {
   Letterbox letterbox_;
   BoxDecoder decoder_;
   DetectionThresholds thresholds_;
-  std::vector<Detection> candidates_;
+  std::vector<Candidate> candidates_;
+  std::vector<Detection> kept_;
 };
 
 }  // namespace posed

@@ -77,6 +77,7 @@ NetworkMetadata read_metadata(const onnx::ModelProto& model, const TensorShape& 
       anchors.push_back({anchor[0], anchor[1]});
     }
   }
+  metadata.boxes_per_anchor = property<int>(model, "posed.boxes_per_anchor", 1);
   const std::vector<int> declared = property<std::vector<int>>(model, "posed.input", {});
   if (!declared.empty() && declared != std::vector<int>{input.channels, input.height, input.width}) {
     refuse(fmt::format("property posed.input is [{}], the graph's input is [{}, {}, {}]", fmt::join(declared, ", "), input.channels,

@@ -49,6 +49,7 @@ void print_outputs(const Network& network, std::ostream& out) {
       for (const Anchor& anchor : metadata.anchors[i]) {
         fmt::print(out, " {:.4g}x{:.4g}", anchor.width, anchor.height);
       }
+      fmt::print(out, "{}", metadata.boxes_per_anchor == 1 ? "" : fmt::format(", {} boxes each", metadata.boxes_per_anchor));
     }
     fmt::print(out, "\n");
   }

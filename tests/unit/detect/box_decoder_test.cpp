@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -58,14 +59,14 @@ TEST_F(AnchorDecoder, AZeroMeansTheMiddleOfTheCellAndTheAnchorsSize) {
   at(1, 4, 2, 5) = logit(0.75F);
   const auto decoder = BoxDecoder::create(HeadKind::Anchors, input, outputs(), metadata, 0);
   ASSERT_TRUE(decoder) << decoder.error().message;
-  std::vector<Detection> found;
+  std::vector<Candidate> found;
   decoder->decode(outputs(), 0.5F, found);
   ASSERT_EQ(found.size(), 1U);
-  EXPECT_NEAR(found[0].score, 0.75F, 1e-6F) << "with one class it is the objectness";
-  EXPECT_NEAR(found[0].box.x_min, 5.5F * 8 - 15, 1e-4F);
-  EXPECT_NEAR(found[0].box.x_max, 5.5F * 8 + 15, 1e-4F);
-  EXPECT_NEAR(found[0].box.y_min, 2.5F * 8 - 20, 1e-4F);
-  EXPECT_NEAR(found[0].box.y_max, 2.5F * 8 + 20, 1e-4F);
+  EXPECT_NEAR(found[0].detection.score, 0.75F, 1e-6F) << "with one class it is the objectness";
+  EXPECT_NEAR(found[0].detection.box.x_min, 5.5F * 8 - 15, 1e-4F);
+  EXPECT_NEAR(found[0].detection.box.x_max, 5.5F * 8 + 15, 1e-4F);
+  EXPECT_NEAR(found[0].detection.box.y_min, 2.5F * 8 - 20, 1e-4F);
+  EXPECT_NEAR(found[0].detection.box.y_max, 2.5F * 8 + 20, 1e-4F);
 }
 
 TEST_F(AnchorDecoder, SizesAreBoundedByFourTimesTheAnchor) {
@@ -74,23 +75,60 @@ TEST_F(AnchorDecoder, SizesAreBoundedByFourTimesTheAnchor) {
   }
   at(0, 4, 0, 0) = 50;
   const auto decoder = BoxDecoder::create(HeadKind::Anchors, input, outputs(), metadata, 0);
-  std::vector<Detection> found;
+  std::vector<Candidate> found;
   decoder->decode(outputs(), 0.5F, found);
   ASSERT_EQ(found.size(), 1U);
-  EXPECT_NEAR(found[0].box.x_max - found[0].box.x_min, 40, 1e-3F);
-  EXPECT_NEAR(found[0].box.y_max - found[0].box.y_min, 80, 1e-3F);
-  EXPECT_NEAR(0.5F * (found[0].box.x_max + found[0].box.x_min), 1.5F * 8, 1e-3F) << "a centre reaches half a cell beyond its own";
+  EXPECT_NEAR(found[0].detection.box.x_max - found[0].detection.box.x_min, 40, 1e-3F);
+  EXPECT_NEAR(found[0].detection.box.y_max - found[0].detection.box.y_min, 80, 1e-3F);
+  EXPECT_NEAR(0.5F * (found[0].detection.box.x_max + found[0].detection.box.x_min), 1.5F * 8, 1e-3F)
+      << "a centre reaches half a cell beyond its own";
+}
+
+TEST_F(AnchorDecoder, OfTwoBoxesTheSecondReachesTwiceAsFarAndHasThePlaceOfTheFirst) {
+  metadata.boxes_per_anchor = 2;
+  metadata.anchors = {{{10, 20}}, {{50, 60}}};
+  for (int box = 0; box < 2; ++box) {
+    at(box, 0, 1, 3) = 50;
+    at(box, 1, 1, 3) = -50;
+    at(box, 2, 1, 3) = at(box, 3, 1, 3) = 0;
+    at(box, 4, 1, 3) = logit(box == 0 ? 0.75F : 0.25F);
+  }
+  const auto decoder = BoxDecoder::create(HeadKind::Anchors, input, outputs(), metadata, 0);
+  ASSERT_TRUE(decoder) << decoder.error().message;
+  std::vector<Candidate> found;
+  decoder->decode(outputs(), 0.1F, found);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_NEAR(found[0].detection.score, 0.75F, 1e-6F);
+  EXPECT_NEAR(found[0].detection.box.x_min, 4.5F * 8 - 5, 1e-3F);
+  EXPECT_NEAR(found[0].detection.box.y_max, 0.5F * 8 + 10, 1e-3F);
+  EXPECT_NEAR(found[1].detection.score, 0.25F, 1e-6F);
+  EXPECT_NEAR(found[1].detection.box.x_min, 5.5F * 8 - 5, 1e-3F);
+  EXPECT_NEAR(found[1].detection.box.y_max, -0.5F * 8 + 10, 1e-3F);
+  EXPECT_EQ(found[0].place, found[1].place);
+  for (int k = 0; k < 5; ++k) {
+    at(0, k, 1, 4) = 3;  // the next column
+  }
+  for (int k = 0; k < 5; ++k) {
+    coarse.values[static_cast<std::size_t>(8 * k + 5)] = 3;  // the same column and row of the next output
+  }
+  decoder->decode(outputs(), 0.1F, found);
+  ASSERT_EQ(found.size(), 4U);
+  std::set<std::size_t> places;
+  for (const Candidate& c : found) {
+    places.insert(c.place);
+  }
+  EXPECT_EQ(places.size(), 3U) << "no other box has that place";
 }
 
 TEST_F(AnchorDecoder, GarbageGivesNoBox) {
   std::fill(fine.values.begin(), fine.values.end(), std::numeric_limits<float>::quiet_NaN());
   std::fill(coarse.values.begin(), coarse.values.end(), std::numeric_limits<float>::infinity());
   const auto decoder = BoxDecoder::create(HeadKind::Anchors, input, outputs(), metadata, 0);
-  std::vector<Detection> found;
+  std::vector<Candidate> found;
   decoder->decode(outputs(), 0.5F, found);
-  for (const Detection& d : found) {
-    EXPECT_TRUE(std::isfinite(d.box.area()));
-    EXPECT_GE(d.score, 0.5F);
+  for (const Candidate& c : found) {
+    EXPECT_TRUE(std::isfinite(c.detection.box.area()));
+    EXPECT_GE(c.detection.score, 0.5F);
   }
 }
 
@@ -103,6 +141,10 @@ TEST_F(AnchorDecoder, RefusesWhatDoesNotFit) {
   EXPECT_THAT(BoxDecoder::create(HeadKind::Anchors, input, outputs(), other, 0).error().message, HasSubstr("output 1"));
   EXPECT_THAT(BoxDecoder::create(HeadKind::Anchors, input, outputs(), metadata, 1).error().message, HasSubstr("class 1"));
   EXPECT_FALSE(BoxDecoder::create(HeadKind::Boxes, input, outputs(), metadata, 0));
+  for (const int boxes : {0, 3}) {
+    metadata.boxes_per_anchor = boxes;
+    EXPECT_FALSE(BoxDecoder::create(HeadKind::Anchors, input, outputs(), metadata, 0)) << boxes;
+  }
 }
 
 TEST(RowDecoder, DecodedBoxesOfTheWantedClassAreTaken) {
@@ -114,11 +156,11 @@ TEST(RowDecoder, DecodedBoxesOfTheWantedClassAreTaken) {
   const std::vector<InferenceOutput> outputs{rows.output};
   const auto decoder = BoxDecoder::create(HeadKind::Boxes, {3, 64, 64}, outputs, {}, 1);
   ASSERT_TRUE(decoder) << decoder.error().message;
-  std::vector<Detection> found;
+  std::vector<Candidate> found;
   decoder->decode(outputs, 0.5F, found);
   ASSERT_EQ(found.size(), 1U);
-  EXPECT_NEAR(found[0].score, 0.72F, 1e-6F);
-  EXPECT_EQ(found[0].box, (BoundingBox{30, 25, 50, 35}));
+  EXPECT_NEAR(found[0].detection.score, 0.72F, 1e-6F);
+  EXPECT_EQ(found[0].detection.box, (BoundingBox{30, 25, 50, 35}));
 }
 
 TEST(RowDecoder, YoloxCellsFollowTheStrides) {
@@ -134,36 +176,50 @@ TEST(RowDecoder, YoloxCellsFollowTheStrides) {
   const std::vector<InferenceOutput> outputs{rows.output};
   const auto decoder = BoxDecoder::create(HeadKind::Yolox, {3, 32, 32}, outputs, {}, 0);
   ASSERT_TRUE(decoder) << decoder.error().message;
-  std::vector<Detection> found;
+  std::vector<Candidate> found;
   decoder->decode(outputs, 0.5F, found);
   ASSERT_EQ(found.size(), 3U);
-  const auto centre = [](const Detection& d) {
-    return std::pair{0.5F * (d.box.x_min + d.box.x_max), 0.5F * (d.box.y_min + d.box.y_max)};
+  const auto centre = [](const Candidate& c) {
+    const BoundingBox& box = c.detection.box;
+    return std::pair{0.5F * (box.x_min + box.x_max), 0.5F * (box.y_min + box.y_max)};
   };
   EXPECT_EQ(centre(found[0]), std::pair(20.0F, 12.0F));
   EXPECT_EQ(centre(found[1]), std::pair(24.0F, 20.0F));
   EXPECT_EQ(centre(found[2]), std::pair(0.0F, 0.0F));
-  EXPECT_NEAR(found[2].box.x_max - found[2].box.x_min, 64, 1e-3F);
-  EXPECT_NEAR(found[2].box.y_max - found[2].box.y_min, 32, 1e-3F);
+  EXPECT_NEAR(found[2].detection.box.x_max - found[2].detection.box.x_min, 64, 1e-3F);
+  EXPECT_NEAR(found[2].detection.box.y_max - found[2].detection.box.y_min, 32, 1e-3F);
   EXPECT_FALSE(BoxDecoder::create(HeadKind::Yolox, {3, 32, 64}, outputs, {}, 0)) << "another number of cells";
 }
 
 TEST(SuppressOverlaps, KeepsTheMostConfidentOfThoseThatOverlap) {
-  std::vector<Detection> found{{{0, 0, 10, 10}, 0.5F}, {{1, 0, 11, 10}, 0.9F}, {{30, 0, 40, 10}, 0.7F}, {{5, 0, 15, 10}, 0.6F}};
+  std::vector<Candidate> found{
+      {{{0, 0, 10, 10}, 0.5F}, 0}, {{{1, 0, 11, 10}, 0.9F}, 1}, {{{30, 0, 40, 10}, 0.7F}, 2}, {{{5, 0, 15, 10}, 0.6F}, 3}};
   suppress_overlaps(found, 0.5F, 10);
   ASSERT_EQ(found.size(), 3U);
-  EXPECT_FLOAT_EQ(found[0].score, 0.9F);
-  EXPECT_FLOAT_EQ(found[1].score, 0.7F);
-  EXPECT_FLOAT_EQ(found[2].score, 0.6F) << "overlaps by 6 of 14 only";
+  EXPECT_FLOAT_EQ(found[0].detection.score, 0.9F);
+  EXPECT_FLOAT_EQ(found[1].detection.score, 0.7F);
+  EXPECT_FLOAT_EQ(found[2].detection.score, 0.6F) << "overlaps by 6 of 14 only";
+}
+
+TEST(SuppressOverlaps, AnAnchorsTwoBoxesSpareEachOtherAndNobodyElse) {
+  const Detection front{{0, 0, 10, 10}, 0.9F};
+  const Detection behind{{2, 0, 12, 10}, 0.5F};
+  const Detection again{{1, 0, 11, 10}, 0.7F};
+  std::vector<Candidate> found{{behind, 7}, {again, 3}, {front, 7}};
+  suppress_overlaps(found, 0.5F, 10);
+  EXPECT_THAT(found, testing::ElementsAre(Candidate{front, 7}, Candidate{behind, 7}));
+  found = {{behind, 2}, {again, 3}, {front, 7}};
+  suppress_overlaps(found, 0.5F, 10);
+  EXPECT_THAT(found, testing::ElementsAre(Candidate{front, 7}));
 }
 
 TEST(SuppressOverlaps, OutcomeDoesNotDependOnTheOrder) {
-  std::vector<Detection> found;
+  std::vector<Candidate> found;
   for (int i = 0; i < 20; ++i) {
     const auto x = static_cast<float>(i * 7 % 20);
-    found.push_back({{x, 0, x + 10, 10}, 0.5F});
+    found.push_back({{{x, 0, x + 10, 10}, 0.5F}, static_cast<std::size_t>(i)});
   }
-  std::vector<Detection> turned(found.rbegin(), found.rend());
+  std::vector<Candidate> turned(found.rbegin(), found.rend());
   suppress_overlaps(found, 0.3F, 3);
   suppress_overlaps(turned, 0.3F, 3);
   EXPECT_EQ(found, turned);

@@ -163,12 +163,33 @@ TEST(NetworkFile, NoticesEveryFlippedBit) {
 
 TEST(NetworkFile, TellsANewerVersion) {
   std::vector<std::uint8_t> bytes = small_file();
-  bytes[8] = 2;
+  bytes[8] = 3;
   mend_checksum(bytes);
   const Result<Network> network = parse_network(bytes, "n.posednet");
   ASSERT_FALSE(network);
   EXPECT_EQ(network.error().code, ErrorCode::Unsupported);
-  EXPECT_THAT(network.error().message, HasSubstr("format version 2"));
+  EXPECT_THAT(network.error().message, HasSubstr("format version 3"));
+  bytes[8] = 0;
+  mend_checksum(bytes);
+  EXPECT_FALSE(parse_network(bytes, "n.posednet"));
+}
+
+TEST(NetworkFile, IsOfTheOldestVersionThatCanHoldIt) {
+  Convolution convolution;
+  convolution.out_channels = 12;
+  convolution.weights.assign(12, 0.5F);
+  convolution.bias.assign(12, 0);
+  const TemporaryFolder folder;
+  for (const int boxes : {1, 2}) {
+    NetworkMetadata metadata{"n", {"person"}, {1}, {std::vector<Anchor>(static_cast<std::size_t>(2 / boxes), Anchor{3, 4})}, boxes};
+    const Network network = Network::create("f", {1, 2, 2}, {{"c", convolution, {0}}}, {1}, metadata).value();
+    ASSERT_TRUE(write_network(network, WeightFormat::Float32, folder / "n.posednet"));
+    EXPECT_EQ(test::file_bytes(folder / "n.posednet")[8], boxes) << "version 1 can be read by an older posed";
+    const Result<Network> again = read_network(folder / "n.posednet");
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->metadata().boxes_per_anchor, boxes);
+    EXPECT_EQ(again->metadata().anchors[0].size(), metadata.anchors[0].size());
+  }
 }
 
 TEST(NetworkFile, SurvivesWrongContentsUnderARightChecksum) {

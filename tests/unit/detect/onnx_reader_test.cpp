@@ -69,6 +69,7 @@ TEST(OnnxReader, ReadsGraphAndMetadata) {
   ASSERT_EQ(metadata.anchors.size(), 2U);
   EXPECT_EQ(metadata.anchors[1][0].width, 20);
   EXPECT_EQ(metadata.anchors[1][0].height, 44);
+  EXPECT_EQ(metadata.boxes_per_anchor, 1) << "where nothing is said";
   EXPECT_EQ(read_onnx_input(test::small_onnx_path()).value(), network.input());
 }
 
