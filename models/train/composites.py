@@ -138,7 +138,7 @@ def hide(cover: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 def position_across(w: int, width: int, beside: float | None, rng: np.random.Generator) -> float:
     """Left edge of a person of width w: beside another one whose middle is given, mostly cut off by a side of the image, or anywhere."""
-    if beside is not None and rng.random() < 0.5:
+    if beside is not None and rng.random() < 0.6:
         return beside - 0.5 * w + rng.uniform(0.15, 0.7) * w * rng.choice((-1, 1))
     if rng.random() < 0.45:
         seen = rng.uniform(0.1, 0.55) * w
@@ -257,8 +257,11 @@ class Compositor:
         background = background_of(self.backgrounds[rng.integers(len(self.backgrounds))], self.width, self.height, rng)
         if rng.random() < 0.4:
             background = clutter(background, [self.backgrounds[i].image for i in rng.integers(len(self.backgrounds), size=8)], rng)
-        people = [self.people[i] for i in rng.integers(len(self.people), size=rng.choice(4, p=[0.08, 0.42, 0.38, 0.12]))]
-        if len(people) > 1 and rng.random() < 0.3:  # in the same clothes
+        people = [self.people[i] for i in rng.integers(len(self.people), size=rng.choice(4, p=[0.08, 0.37, 0.43, 0.12]))]
+        near = np.sort(rng.random(len(people)) ** 0.7)
+        if len(people) > 1 and rng.random() < 0.4:  # one close behind the other
+            near[-2] = near[-1] * rng.uniform(0.6, 0.95)
+        if len(people) > 1 and rng.random() < 0.4:  # in the same clothes
             people[1] = people[0]
-        image, boxes = composite(background, list(zip(people, np.sort(rng.random(len(people)) ** 0.7))), rng)
+        image, boxes = composite(background, list(zip(people, near)), rng)
         return Sample(Path("composite"), image, np.zeros(len(boxes), np.int64), boxes.astype(np.float32))
