@@ -7,6 +7,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+CENTRE_REACH = (1.0, 2.0)  # how far from the cell's middle the centre of an anchor's first and second box may be [cells]
+
 
 def iou_matrix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Intersection over union of each of N boxes with each of M: N x M."""
@@ -16,6 +18,20 @@ def iou_matrix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     area_a = (a[:, 2:] - a[:, :2]).prod(1)
     area_b = (b[:, 2:] - b[:, :2]).prod(1)
     return joint / np.maximum(area_a[:, None] + area_b[None, :] - joint, 1e-9)
+
+
+def paired_iou(a: Tensor, b: Tensor) -> Tensor:
+    """Intersection over union of boxes (centre x, centre y, width, height) with each other, by broadcasting."""
+    low = torch.maximum(a[..., :2] - a[..., 2:] / 2, b[..., :2] - b[..., 2:] / 2)
+    high = torch.minimum(a[..., :2] + a[..., 2:] / 2, b[..., :2] + b[..., 2:] / 2)
+    joint = (high - low).clamp(0).prod(-1)
+    return joint / (a[..., 2:].prod(-1) + b[..., 2:].prod(-1) - joint).clamp(1e-9)
+
+
+def decode_boxes(raw: Tensor, anchors: Tensor, reach: float) -> Tensor:
+    """Raw values (x, y, width, height and whatever else) of M cells as boxes: centre relative to the cell, size; all in cells."""
+    values = raw[:, :4].sigmoid()
+    return torch.cat(((values[:, :2] * 2 - 1) * reach + 0.5, (values[:, 2:] * 2) ** 2 * anchors), 1)
 
 
 def size_iou(sizes: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -41,8 +57,9 @@ def complete_iou(predicted: Tensor, truth: Tensor, eps: float = 1e-7) -> Tensor:
     return iou - distance / diagonal - weight * shape
 
 
-def suppress_overlaps(boxes: np.ndarray, scores: np.ndarray, iou: float, limit: int = 300) -> np.ndarray:
-    """Greedy non-maximum suppression: indices of the boxes that stay, most confident first."""
+def suppress_overlaps(boxes: np.ndarray, scores: np.ndarray, iou: float, limit: int = 300, places: np.ndarray | None = None) -> np.ndarray:
+    """Greedy non-maximum suppression: indices of the boxes that stay, most confident first. Boxes of one of the `places` spare each other:
+    an anchor's two boxes are of two people (Chu et al., CVPR 2020, section 3.3)."""
     order = np.argsort(-scores, kind="stable")[:1000]
     kept: list[int] = []
     overlap = iou_matrix(boxes[order], boxes[order])
@@ -50,5 +67,8 @@ def suppress_overlaps(boxes: np.ndarray, scores: np.ndarray, iou: float, limit: 
     for i in range(len(order)):
         if alive[i] and len(kept) < limit:
             kept.append(order[i])
-            alive &= overlap[i] <= iou
+            spared = overlap[i] <= iou
+            if places is not None:
+                spared |= places[order] == places[order[i]]
+            alive &= spared
     return np.array(kept, int)

@@ -14,7 +14,7 @@ import onnx
 import torch
 
 from dataset import DataError, letterbox
-from metrics import decode, suppress
+from metrics import Candidates, decode, suppress
 from network import NetworkOptions, Yolo
 
 SCORE_FLOOR = 0.01  # what is less certain is not looked at
@@ -60,8 +60,8 @@ class CheckpointDetector:
         boxed, *placement = letterbox(image, self.width, self.height)
         x = torch.from_numpy(boxed[:, :, ::-1].copy()).permute(2, 0, 1)[None].float() / 255
         options = self.network.options
-        boxes, scores = decode(self.network(x), self.anchors, options.strides, options.classes, SCORE_FLOOR)
-        found, confidence = suppress(boxes[0], scores[0])
+        candidates = decode(self.network(x), self.anchors, options.strides, options.classes, SCORE_FLOOR, options.boxes_per_anchor)
+        found, confidence = suppress(candidates[0])
         return to_image(found, *placement, image.shape), confidence
 
 
@@ -78,6 +78,7 @@ class OnnxDetector:
         _, self.height, self.width = properties["posed.input"]
         self.anchors, self.strides = np.array(properties["posed.anchors"]), tuple(properties["posed.strides"])
         self.classes = len(properties["posed.classes"])
+        self.boxes_per_anchor = properties.get("posed.boxes_per_anchor", 1)
         self.outputs = [o.name for o in model.graph.output]
         self.network = cv2.dnn.readNetFromONNX(str(path))
 
@@ -89,8 +90,8 @@ class OnnxDetector:
     def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         boxed, *placement = letterbox(image, self.width, self.height)
         heads = tuple(torch.from_numpy(h.copy()) for h in self.heads(boxed))
-        boxes, scores = decode(heads, self.anchors, self.strides, self.classes, SCORE_FLOOR)
-        found, confidence = suppress(boxes[0], scores[0])
+        candidates = decode(heads, self.anchors, self.strides, self.classes, SCORE_FLOOR, self.boxes_per_anchor)
+        found, confidence = suppress(candidates[0])
         return to_image(found, *placement, image.shape), confidence
 
 
@@ -120,7 +121,8 @@ class YoloxDetector:
         kept = scores >= SCORE_FLOOR
         centre = (values[kept, :2] + self.cells[kept]) * self.strides[kept]
         size = np.exp(values[kept, 2:4]) * self.strides[kept]
-        found, confidence = suppress(np.concatenate((centre - size / 2, centre + size / 2), 1), scores[kept])
+        boxes = np.concatenate((centre - size / 2, centre + size / 2), 1)
+        found, confidence = suppress(Candidates(boxes, scores[kept], np.arange(len(boxes))))
         return to_image(found, scale, 0, 0, image.shape), confidence
 
 

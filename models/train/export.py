@@ -64,7 +64,8 @@ def export(network: Yolo, anchors: np.ndarray, classes: list[str], name: str, wi
                       output_names=outputs, do_constant_folding=True)
     model = onnx.load(str(path))
     properties = {"posed.name": name, "posed.classes": classes, "posed.strides": list(strides),
-                  "posed.anchors": np.asarray(anchors).tolist(), "posed.input": [3, height, width]}
+                  "posed.anchors": np.asarray(anchors).tolist(), "posed.input": [3, height, width],
+                  "posed.boxes_per_anchor": network.options.boxes_per_anchor}
     onnx.helper.set_model_props(model, {key: json.dumps(value) for key, value in properties.items()})
     if half:
         halve_weights(model)

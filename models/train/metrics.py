@@ -1,41 +1,57 @@
 """Decoding of raw heads, and average precision."""
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from torch import Tensor
 
-from boxes import iou_matrix, suppress_overlaps
+from boxes import CENTRE_REACH, iou_matrix, suppress_overlaps
 
 
-def decode(heads: tuple[Tensor, ...], anchors: np.ndarray, strides: tuple[int, ...], classes: int, score: float):
-    """Boxes [pixels of the input] and scores of each image of the batch: lists of N x 4 and N arrays, before suppression.
+@dataclass(frozen=True)
+class Candidates:
+    """What a network sees in one image, before suppression."""
+
+    boxes: np.ndarray  # N x 4 [pixels of the input]
+    scores: np.ndarray  # N
+    places: np.ndarray  # N; equal for boxes of the same anchor in the same cell
+
+
+def decode(heads: tuple[Tensor, ...], anchors: np.ndarray, strides: tuple[int, ...], classes: int, score: float,
+           boxes_per_anchor: int = 1) -> list[Candidates]:
+    """The candidates of at least `score`, of each image of the batch.
 
     The score is the objectness times the best class's; with one class it is the objectness alone.
     """
     batch = heads[0].shape[0]
-    boxes: list[list[np.ndarray]] = [[] for _ in range(batch)]
-    scores: list[list[np.ndarray]] = [[] for _ in range(batch)]
+    parts: list[list[tuple[np.ndarray, ...]]] = [[] for _ in range(batch)]
+    begin = 0
+    reach = np.array(CENTRE_REACH)
     for head, stride, layer in zip(heads, strides, anchors):
         _, _, height, width = head.shape
-        values = head.detach().float().view(batch, len(layer), 5 + classes, height, width).sigmoid().numpy()
-        confidence = values[:, :, 4]
+        shape = batch, len(layer), boxes_per_anchor, 5 + classes, height, width
+        values = head.detach().float().view(shape).sigmoid().numpy()
+        confidence = values[:, :, :, 4]
         if classes > 1:
-            confidence = confidence * values[:, :, 5:].max(2)
-        image, anchor, row, column = np.nonzero(confidence >= score)
-        v = values[image, anchor, :, row, column]
-        centre = (v[:, :2] * 2 - 0.5 + np.stack((column, row), 1)) * stride
+            confidence = confidence * values[:, :, :, 5:].max(3)
+        found = image, anchor, which, row, column = np.nonzero(confidence >= score)
+        v = values[image, anchor, which, :, row, column]
+        centre = ((v[:, :2] * 2 - 1) * reach[which, None] + 0.5 + np.stack((column, row), 1)) * stride
         size = (v[:, 2:4] * 2) ** 2 * np.asarray(layer)[anchor]
-        found = np.concatenate((centre - size / 2, centre + size / 2), 1)
+        boxes = np.concatenate((centre - size / 2, centre + size / 2), 1)
+        places = begin + (anchor * height + row) * width + column
         for i in range(batch):
-            boxes[i].append(found[image == i])
-            scores[i].append(confidence[image, anchor, row, column][image == i])
-    return [np.concatenate(b) for b in boxes], [np.concatenate(s) for s in scores]
+            parts[i].append((boxes[image == i], confidence[found][image == i], places[image == i]))
+        begin += len(layer) * height * width
+    return [Candidates(*(np.concatenate(p) for p in zip(*of_layers))) for of_layers in parts]
 
 
-def suppress(boxes: np.ndarray, scores: np.ndarray, iou: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-    kept = suppress_overlaps(boxes, scores, iou) if len(boxes) else np.zeros(0, int)
-    return boxes[kept], scores[kept]
+def suppress(found: Candidates, iou: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes and scores that stay, most confident first."""
+    kept = suppress_overlaps(found.boxes, found.scores, iou, places=found.places) if len(found.boxes) else np.zeros(0, int)
+    return found.boxes[kept], found.scores[kept]
 
 
 class AveragePrecision:

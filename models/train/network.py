@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 import fused_norm
+from boxes import CENTRE_REACH
 
 STRIDES_4 = (4, 8, 16, 32)
 STRIDES_3 = (8, 16, 32)
@@ -30,6 +31,7 @@ class NetworkOptions:
     ghost: bool = True
     cbam: bool = True
     fourth_layer: bool = True
+    boxes_per_anchor: int = 1  # 2: the second one is of somebody who overlaps the first one's person
 
     @property
     def strides(self) -> tuple[int, ...]:
@@ -163,7 +165,10 @@ class Cbam(nn.Module):
 
 
 class Yolo(nn.Module):
-    """`forward` gives the raw heads, one N x (3 * (5 + classes)) x H / stride x W / stride for each stride, finest first."""
+    """`forward` gives the raw heads, one N x (3 * boxes_per_anchor * (5 + classes)) x H / stride x W / stride for each stride, finest
+    first; an anchor's boxes stand beside each other.
+
+    Two boxes an anchor are those of Chu et al., "Detection in crowded scenes: one proposal, multiple predictions", CVPR 2020."""
 
     def __init__(self, options: NetworkOptions = NetworkOptions()):
         super().__init__()
@@ -194,7 +199,7 @@ class Yolo(nn.Module):
         self.bottom3, self.out4 = Conv(c3, c3, 3, 2), C3(2 * c3, c4, count(3), False, ghost)
         self.bottom4, self.out5 = Conv(c4, c4, 3, 2), C3(2 * c4, c5, count(3), False, ghost)
 
-        values = ANCHORS_PER_LAYER * (BOX_VALUES + options.classes)
+        values = ANCHORS_PER_LAYER * options.boxes_per_anchor * (BOX_VALUES + options.classes)
         heads = ([c2] if fourth else []) + [c3, c4, c5]
         self.heads = nn.ModuleList(nn.Conv2d(c, values, 1) for c in heads)
         self._expect_few_objects()
@@ -202,7 +207,7 @@ class Yolo(nn.Module):
     def _expect_few_objects(self) -> None:
         """Objectness begins at what 8 objects in an image of 640 x 640 would give, so that training need not learn it first."""
         for head, stride in zip(self.heads, self.options.strides):
-            bias = head.bias.detach().view(ANCHORS_PER_LAYER, -1)
+            bias = head.bias.detach().view(ANCHORS_PER_LAYER * self.options.boxes_per_anchor, -1)
             bias[:, 4] = math.log(8 / (640 / stride) ** 2)
             bias[:, 5:] = math.log(0.6 / max(self.options.classes - 0.99, 0.01))
             head.bias = nn.Parameter(bias.reshape(-1))
@@ -226,6 +231,24 @@ class Yolo(nn.Module):
         o5 = self.out5(torch.cat((self.bottom4(o4), l5), 1))
         outputs += [o3, o4, o5]
         return tuple(head(o) for head, o in zip(self.heads, outputs))
+
+
+def with_second_boxes(state: dict[str, Tensor], had: NetworkOptions, wanted: NetworkOptions) -> dict[str, Tensor]:
+    """The weights of a network of `had`, for one of `wanted` that may have a second box an anchor: it begins about where the first one is,
+    and hardly believes it."""
+    if had.boxes_per_anchor == wanted.boxes_per_anchor or wanted.boxes_per_anchor == 1:
+        return state
+    state = dict(state)
+    values = BOX_VALUES + had.classes
+    for name in [n for n in state if n.startswith("heads.")]:
+        first = state[name].float().reshape(ANCHORS_PER_LAYER, values, -1)
+        second = first.clone()
+        second[:, :2] *= CENTRE_REACH[0] / CENTRE_REACH[1]
+        second[:, 4] *= 0.5
+        if name.endswith("bias"):
+            second[:, 4] -= 2.0
+        state[name] = torch.stack((first, second), 1).reshape(-1, *state[name].shape[1:])
+    return state
 
 
 def parameter_count(network: nn.Module) -> int:

@@ -22,7 +22,7 @@ from composites import Compositor, read_cut_outs
 from dataset import DataError, Sample, letterbox, read_folder
 from loss import DetectionLoss
 from metrics import AveragePrecision, decode, suppress
-from network import ANCHORS_PER_LAYER, NetworkOptions, Yolo, parameter_count
+from network import ANCHORS_PER_LAYER, NetworkOptions, Yolo, parameter_count, with_second_boxes
 from team import Team, fork_team
 
 
@@ -134,8 +134,7 @@ def average_precision(network: nn.Module, samples: list[Sample], width: int, hei
     for sample in samples:
         image, scale, left, top = letterbox(sample.image, width, height)
         x = torch.from_numpy(image[:, :, ::-1].copy()).permute(2, 0, 1)[None].float() / 255
-        boxes, scores = decode(network(x), anchors, options.strides, options.classes, 0.01)
-        found, confidence = suppress(boxes[0], scores[0])
+        found, confidence = suppress(decode(network(x), anchors, options.strides, options.classes, 0.01, options.boxes_per_anchor)[0])
         ap.add((found - [left, top, left, top]) / scale, confidence, sample.boxes)
     return ap
 
@@ -171,7 +170,8 @@ class Training:
             PRESETS[args.preset], **{k: v for k, v in vars(args).items() if k in Settings.__dataclass_fields__ and v is not None})
         torch.manual_seed(args.seed)
         options = NetworkOptions(**saved["options"]) if saved else NetworkOptions(
-            width=args.width, ghost=not args.no_ghost, cbam=not args.no_cbam, fourth_layer=not args.no_fourth_layer)
+            width=args.width, ghost=not args.no_ghost, cbam=not args.no_cbam, fourth_layer=not args.no_fourth_layer,
+            boxes_per_anchor=args.boxes_per_anchor)
         self.samples = [s for folder in args.data for s in read_folder(folder, options.classes, args.longest_side)]
         self.valid = read_folder(args.valid, options.classes) if args.valid else []
         self.compositor = self.read_compositor() if args.cut_outs else None
@@ -182,12 +182,12 @@ class Training:
             self.network.load_state_dict(saved["network"])
         elif args.start_from:
             start = torch.load(args.start_from, map_location="cpu")
-            self.network.load_state_dict(start["ema"])
+            self.network.load_state_dict(with_second_boxes(start["ema"], NetworkOptions(**start["options"]), options))
             self.anchors = np.array(start["anchors"])
         self.network.to(self.device, memory_format=torch.channels_last)
         self.ema = MovingAverage(self.network, self.settings.ema_half_life_steps)
         self.optimizer = make_optimizer(self.network, self.settings)
-        self.loss = DetectionLoss(torch.tensor(self.anchors), options.strides, options.classes).to(self.device)
+        self.loss = DetectionLoss(torch.tensor(self.anchors), options.strides, options.classes, options.boxes_per_anchor).to(self.device)
         self.step, self.seconds = 0, 0.0
         self.before = self.begun = 0.0  # seconds of earlier sessions, and when this one began
         if saved:
@@ -298,6 +298,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--no-ghost", action="store_true")
     parser.add_argument("--no-cbam", action="store_true")
     parser.add_argument("--no-fourth-layer", action="store_true")
+    parser.add_argument("--boxes-per-anchor", type=int, choices=(1, 2), default=1,
+                        help="2: one more for somebody who overlaps another person; --start-from may have 1")
     for name, field in Settings.__dataclass_fields__.items():
         parser.add_argument("--" + name.replace("_", "-"), type={"int": int, "float": float, "str": str}[field.type], default=None,
                             choices=AUGMENTATIONS if name == "augmentation" else None, help=f"instead of the preset's {name}")

@@ -6,8 +6,9 @@ import unittest
 import numpy as np
 import torch
 
-from boxes import complete_iou, iou_matrix, suppress_overlaps
-from loss import DetectionLoss, match_targets, nearest_of_each_cell
+from boxes import complete_iou, iou_matrix, paired_iou, suppress_overlaps
+from loss import DetectionLoss, match_targets, nearest_of_each_cell, partners
+from metrics import decode
 
 
 class Overlaps(unittest.TestCase):
@@ -15,6 +16,11 @@ class Overlaps(unittest.TestCase):
         a = np.array([[0.0, 0, 10, 10]])
         b = np.array([[0.0, 0, 10, 10], [5, 5, 15, 15], [20, 20, 30, 30], [2, 2, 4, 4]])
         np.testing.assert_allclose(iou_matrix(a, b)[0], [1, 25 / 175, 0, 4 / 100])
+
+        def centred(boxes):
+            return torch.tensor(np.concatenate(((boxes[:, :2] + boxes[:, 2:]) / 2, boxes[:, 2:] - boxes[:, :2]), 1))
+
+        np.testing.assert_allclose(paired_iou(centred(a), centred(b)).numpy(), iou_matrix(a, b)[0])
 
     def test_complete_iou_by_hand(self):
         """Zheng et al. 2020: overlap, less the distance of the centres, less the difference of the proportions."""
@@ -47,9 +53,10 @@ class Matching(unittest.TestCase):
     anchors = torch.tensor([[2.0, 4.0], [20.0, 40.0]])
 
     def match(self, x: float, y: float, w: float, h: float, rows: int = 10, columns: int = 12):
-        image, anchor, row, column, _, box = match_targets(torch.tensor([[1.0, 0, x, y, w, h]]), self.anchors, rows, columns, 4.0)
-        self.assertTrue((image == 1).all())
-        return sorted(zip(anchor.tolist(), column.tolist(), row.tolist())), box
+        targets = torch.tensor([[1.0, 0, x, y, w, h]])
+        found = match_targets(targets, self.anchors, rows, columns, 4.0)
+        self.assertTrue((found.image == 1).all() and (found.target == 0).all())
+        return sorted(zip(found.anchor.tolist(), found.column.tolist(), found.row.tolist())), found.boxes(targets, found.target)
 
     def test_own_cell_and_the_two_nearest_neighbours(self):
         cells, box = self.match(5.2, 3.7, 2, 4)
@@ -68,15 +75,26 @@ class Matching(unittest.TestCase):
     def test_a_cell_that_two_boxes_claim_is_that_of_the_nearer_centre(self):
         left, right = [0.0, 0, 5.2, 3.5, 2, 4], [0.0, 0, 6.1, 3.5, 2.5, 4]
         elsewhere = [1.0, 0, 5.4, 3.5, 2, 4]  # in another image
-        for targets in ([left, right, elsewhere], [right, elsewhere, left]):
-            found = match_targets(torch.tensor(targets), self.anchors[:1], 10, 12, 4.0)
-            image, _, row, column, _, box = nearest_of_each_cell(found, 1, 10, 12)
-            widths = {(i, c, r): float(b[2]) for i, c, r, b in zip(image.tolist(), column.tolist(), row.tolist(), box)}
-            self.assertEqual(len(widths), len(image))  # each cell once
-            self.assertEqual(sorted(widths), sorted(set(zip(*(m.tolist() for m in (found[0], found[3], found[2]))))))
+        for targets in (torch.tensor([left, right, elsewhere]), torch.tensor([right, elsewhere, left])):
+            found = match_targets(targets, self.anchors[:1], 10, 12, 4.0)
+            nearest = nearest_of_each_cell(found, targets, 1, 10, 12)
+
+            def cells(matches):
+                return list(zip(matches.image.tolist(), matches.column.tolist(), matches.row.tolist()))
+
+            widths = dict(zip(cells(nearest), targets[nearest.target, 4].tolist()))
+            self.assertEqual(len(widths), len(nearest))  # each cell once
+            self.assertEqual(sorted(widths), sorted(set(cells(found))))
             self.assertEqual((widths[0, 5, 3], widths[0, 6, 3], widths[1, 5, 3]), (2.0, 2.5, 2.0))
-        nobody = nearest_of_each_cell(match_targets(torch.zeros(0, 6), self.anchors, 10, 12, 4.0), 2, 10, 12)
-        self.assertEqual(len(nobody[0]), 0)
+        nobody = torch.zeros(0, 6)
+        self.assertEqual(len(nearest_of_each_cell(match_targets(nobody, self.anchors, 10, 12, 4.0), nobody, 2, 10, 12)), 0)
+
+    def test_the_partner_is_who_overlaps_most_in_the_same_image(self):
+        targets = torch.tensor([[0.0, 0, 50, 50, 20, 40], [0, 0, 58, 50, 20, 40], [0, 0, 53, 50, 20, 40], [1, 0, 50, 50, 20, 40],
+                                [0, 0, 90, 50, 20, 40]])
+        self.assertEqual(partners(targets, 0.3).tolist(), [2, 2, 0, -1, -1])
+        self.assertEqual(partners(targets, 0.9).tolist(), [-1] * 5)
+        self.assertEqual(partners(torch.zeros(0, 6), 0.3).tolist(), [])
 
 
 class Loss(unittest.TestCase):
@@ -107,3 +125,63 @@ class Loss(unittest.TestCase):
         for width, height, perfect in ((8, 16, True), (12, 16, False)):
             _, parts = self.loss(self.heads, torch.tensor([[0.0, 0, 20, 28, width, height]]))
             self.assertEqual(parts["box"] < 1e-5, perfect)
+
+
+class TwoBoxes(unittest.TestCase):
+    """Two people who overlap by 0.6, and one who stands alone; heads that are free to become anything."""
+
+    strides = (8, 16, 32)
+    anchors = np.array([[[20, 40]] * 3, [[40.0, 80]] * 3, [[60, 120]] * 3])
+    pair = torch.tensor([[0.0, 0, 60, 64, 40, 80], [0, 0, 70, 64, 40, 80], [0, 0, 150, 64, 40, 80]])
+
+    def setUp(self):
+        self.loss = DetectionLoss(torch.tensor(self.anchors), self.strides, 1, 2)
+
+    def heads(self) -> tuple[torch.Tensor, ...]:
+        return tuple(torch.zeros(1, 36, 128 // s, 192 // s, requires_grad=True) for s in self.strides)
+
+    def test_an_anchor_learns_both_people_of_a_pair_and_of_one_alone_the_one(self):
+        heads = self.heads()
+        optimizer = torch.optim.Adam(heads, 0.2)
+        for _ in range(100):
+            optimizer.zero_grad()
+            self.loss(heads, self.pair)[0].backward()
+            optimizer.step()
+        found = decode(heads, self.anchors, self.strides, 1, 0.5, 2)[0]
+        truth = self.pair[:, 2:].numpy()
+        truth = np.concatenate((truth[:, :2] - truth[:, 2:] / 2, truth[:, :2] + truth[:, 2:] / 2), 1)
+        overlaps = iou_matrix(found.boxes, truth)
+        self.assertGreater(overlaps.max(1).min(), 0.7)
+        whose = {place: set() for place in found.places}
+        for place, person in zip(found.places, overlaps.argmax(1)):
+            whose[place].add(int(person))
+        groups = [people for people in whose.values()]
+        self.assertTrue(all(people <= {0, 1} or people == {2} for people in groups))
+        self.assertGreater(groups.count({0, 1}), len(groups) / 3)
+        self.assertIn({2}, groups)
+        self.assertTrue(all((found.places == place).sum() == len(people) for place, people in whose.items()))
+
+    def test_which_box_is_whose_is_left_to_them(self):
+        """In a cell between the two either order is in reach: that counts which costs less, so that none of the boxes is drawn away."""
+        loss = DetectionLoss(torch.tensor([[[60.0, 120]]] * 3), self.strides, 1, 2)
+        targets = self.pair[:2].clone()
+        targets[:, 2:] /= 32
+        matches = nearest_of_each_cell(match_targets(targets, loss.anchors[2] / 32, 4, 6, 4.0), targets, 1, 4, 6)
+        for order in ((0, 1), (1, 0)):
+            chosen = torch.zeros(len(matches), 2, 6)
+            for which, reach in enumerate((1, 2)):
+                share = (matches.boxes(targets, torch.full_like(matches.target, order[which]))[:, :2] - 0.5) / reach / 2 + 0.5
+                chosen[:, which, :2] = share.clamp(0.01, 0.99).logit()
+                chosen[:, which, 2:4] = (0.5 * torch.tensor(2 / 3).sqrt()).logit()
+            asked, target, overlap = loss.assigned(chosen, targets, matches, loss.anchors[2][matches.anchor] / 32)
+            self.assertTrue(asked.all())
+            self.assertEqual(target.tolist(), [list(order)] * len(matches))
+            self.assertGreater(float(overlap.min()), 0.95)
+
+    def test_where_nobody_overlaps_anybody_second_boxes_are_asked_for_nobody(self):
+        heads = self.heads()
+        self.loss(heads, self.pair[2:])[0].backward()
+        for head in heads:
+            gradient = head.grad.view(3, 2, 6, *head.shape[2:])
+            self.assertTrue((gradient[:, 1, 4] > 0).all())
+            self.assertEqual(float(gradient[:, 1, :4].abs().max()), 0.0)

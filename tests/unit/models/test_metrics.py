@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import unittest
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import torch
 
 from dataset import Sample
 from evaluate import at_scores, measure
-from metrics import AveragePrecision, decode
+from metrics import AveragePrecision, decode, suppress
 
 ONE = np.array([[0.0, 0, 10, 10]])
 TWO = np.array([[0.0, 0, 10, 10], [50, 50, 60, 60]])
@@ -65,7 +66,22 @@ class Decoding(unittest.TestCase):
         head = torch.full((1, 18, 4, 4), -20.0)
         values = head.view(1, 3, 6, 4, 4)
         values[0, 1, :, 2, 3] = torch.tensor([0.0, 0.0, 0.0, np.log(3.0), 2.0, 0.0])
-        boxes, scores = decode((head,), np.array([[[8, 8], [10, 20], [30, 30]]]), (8,), 1, 0.5)
+        found = decode((head,), np.array([[[8, 8], [10, 20], [30, 30]]]), (8,), 1, 0.5)[0]
         centre, size = np.array([3.5 * 8, 2.5 * 8]), np.array([10, 20 * 1.5**2])
-        np.testing.assert_allclose(boxes[0], [np.concatenate((centre - size / 2, centre + size / 2))], rtol=1e-5)
-        np.testing.assert_allclose(scores[0], [1 / (1 + np.exp(-2.0))], rtol=1e-5)
+        np.testing.assert_allclose(found.boxes, [np.concatenate((centre - size / 2, centre + size / 2))], rtol=1e-5)
+        np.testing.assert_allclose(found.scores, [1 / (1 + np.exp(-2.0))], rtol=1e-5)
+
+    def test_an_anchors_second_box_reaches_twice_as_far_and_is_spared_by_the_first(self):
+        heads = torch.full((2, 24, 2, 2), -20.0), torch.full((2, 24, 1, 1), -20.0)
+        values = heads[1].view(2, 2, 2, 6)
+        values[1, 1, 0] = torch.tensor([0.0, 0.0, 0.0, 0.0, 2.0, 0.0])
+        values[1, 1, 1] = torch.tensor([-20.0, 20.0, 0.0, 0.0, 1.0, 0.0])
+        values[1, 0, 0] = torch.tensor([0.0, 0.0, 0.0, 0.0, 0.5, 0.0])  # the other anchor, where the first box is
+        anchors = np.array([[[8, 8], [9, 9]], [[100, 100], [100, 110]]])
+        nobody, found = decode(heads, anchors, (8, 16), 1, 0.5, 2)
+        self.assertEqual(len(nobody.boxes), 0)
+        boxes, scores = suppress(found, 0.25)
+        np.testing.assert_allclose((boxes[:, :2] + boxes[:, 2:]) / 2, [[8, 8], [-24, 40]], atol=1e-3)
+        np.testing.assert_allclose(scores, 1 / (1 + np.exp([-2.0, -1.0])), rtol=1e-5)
+        separate = replace(found, places=np.arange(3))
+        self.assertEqual(len(suppress(separate, 0.25)[0]), 1)

@@ -4,7 +4,8 @@ import unittest
 
 import torch
 
-from network import Cbam, NetworkOptions, Silu, Yolo, parameter_count
+from boxes import CENTRE_REACH, decode_boxes
+from network import Cbam, NetworkOptions, Silu, Yolo, parameter_count, with_second_boxes
 
 
 class ParameterCounts(unittest.TestCase):
@@ -29,6 +30,27 @@ class Forward(unittest.TestCase):
         with torch.no_grad():
             shapes = [tuple(head.shape) for head in network(torch.zeros(2, 3, 64, 96))]
         self.assertEqual(shapes, [(2, 21, 16, 24), (2, 21, 8, 12), (2, 21, 4, 6), (2, 21, 2, 3)])
+
+    def test_a_second_box_an_anchor_begins_about_where_the_first_one_is_and_less_sure(self):
+        torch.manual_seed(1)
+        one = Yolo(NetworkOptions(width=0.125)).eval()
+        both = NetworkOptions(width=0.125, boxes_per_anchor=2)
+        two = Yolo(both).eval()
+        two.load_state_dict(with_second_boxes(one.state_dict(), one.options, both))
+        image = torch.rand(1, 3, 64, 96)
+        with torch.no_grad():
+            for before, after in zip(one(image), two(image)):
+                rows, columns = before.shape[2:]
+                before, after = before.view(3, 6, rows, columns), after.view(3, 2, 6, rows, columns)
+                torch.testing.assert_close(after[:, 0], before, atol=1e-5, rtol=1e-5)
+
+                def flat(raw):
+                    return raw.permute(0, 2, 3, 1).reshape(-1, 6)
+
+                anchors = torch.full((flat(before).shape[0], 2), 3.0)
+                boxes = [decode_boxes(flat(raw), anchors, reach) for raw, reach in zip((before, after[:, 1]), CENTRE_REACH)]
+                torch.testing.assert_close(boxes[1], boxes[0], atol=0.1, rtol=0)
+                torch.testing.assert_close(after[:, 1, 4], 0.5 * before[:, 4] - 2, atol=1e-5, rtol=1e-5)
 
     def test_without_the_fourth_layer_strides_begin_at_8(self):
         network = Yolo(NetworkOptions(width=0.125, fourth_layer=False)).eval()

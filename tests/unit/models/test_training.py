@@ -121,6 +121,7 @@ class Export(WithImages):
             self.assertGreater(float(wanted.std()), 1e-3)
             np.testing.assert_allclose(head, wanted.numpy(), atol=1e-4)
         np.testing.assert_array_equal(detector.anchors, anchors)
+        self.assertEqual(detector.boxes_per_anchor, 1)
 
     def test_weights_of_16_bits_halve_the_file(self):
         network = self.randomised()
