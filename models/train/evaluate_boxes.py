@@ -25,7 +25,7 @@ import numpy as np
 from boxes import iou_matrix
 from dataset import DataError, read_folder
 from evaluate import at_scores
-from metrics import AveragePrecision
+from metrics import AveragePrecision, found_by
 
 
 IGNORED_OVERLAP = 0.3  # intersection over union with an ignored box, from which on a box is of the same person
@@ -87,18 +87,21 @@ class Measure:
     others_empty: bool = False
     masks_by_person: bool = False
 
-    def counted(self, name: str, boxes: np.ndarray) -> np.ndarray:
-        if self.masks is None:
-            return area(boxes) >= self.least_area
+    def seen(self, name: str, boxes: np.ndarray) -> tuple[np.ndarray, int]:
+        """How many pixels of the mask are in each box and its person's; and the image's width."""
         mask = cv2.imread(str(self.masks / f"{name}.png"), cv2.IMREAD_GRAYSCALE)
         if mask is None:
             raise DataError(f"{self.masks / name}.png: no mask that can be read")
         if not self.masks_by_person:
-            seen = visible_pixels(boxes, mask)
-        elif mask.max() <= len(boxes):
-            seen = np.array([visible_pixels(box[None], mask == i)[0] for i, box in enumerate(boxes, 1)])
-        else:
+            return visible_pixels(boxes, mask), mask.shape[1]
+        if mask.max() > len(boxes):
             raise DataError(f"{self.masks / name}.png: a pixel of person {mask.max()}, where the truth has {len(boxes)}")
+        return np.array([visible_pixels(box[None], mask == i)[0] for i, box in enumerate(boxes, 1)]), mask.shape[1]
+
+    def counted(self, name: str, boxes: np.ndarray) -> np.ndarray:
+        if self.masks is None or not len(boxes):
+            return area(boxes) >= self.least_area
+        seen, _ = self.seen(name, boxes)
         return (seen >= self.least_area) & (seen >= self.least_visible * area(boxes))
 
 
@@ -114,7 +117,7 @@ def compare(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], m
     ap = AveragePrecision(measure.overlap)
     for name, boxes in truth.items():
         rows = np.array(found.get(name, []), float).reshape(-1, 5)
-        counted = measure.counted(name, boxes) if len(boxes) else np.zeros(0, bool)
+        counted = measure.counted(name, boxes)
         on_counted = iou_matrix(rows[:, 1:], boxes[counted]).max(1, initial=0) >= measure.overlap
         on_others = iou_matrix(rows[:, 1:], boxes[~counted]).max(1, initial=0) >= measure.overlap
         left_out = np.array((ignored or {}).get(name, []), float).reshape(-1, 5)[:, 1:]
@@ -123,6 +126,36 @@ def compare(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], m
         kept = on_counted | (~on_others & ~on_ignored & (area(rows[:, 1:]) >= measure.least_area))
         ap.add(rows[kept, 1:], rows[kept, 0], boxes[counted])
     return ap
+
+
+def kind_of(boxes: np.ndarray, i: int, seen: float, width: int) -> str:
+    """Why person i might be hard to find. `seen`: share of the box."""
+    others = iou_matrix(boxes[i : i + 1], np.delete(boxes, i, 0))
+    is_cut = boxes[i, 0] < 2 or boxes[i, 2] > width - 3
+    if others.max(initial=0) > 0.4:
+        return "pair"
+    if is_cut and boxes[i, 2] - boxes[i, 0] < 0.17 * width:
+        return "sliver"
+    if seen < 0.5:
+        return "hidden"
+    return "cut" if is_cut else "other"
+
+
+def misses_by_kind(found: dict[str, list[list[float]]], truth: dict[str, np.ndarray], measure: Measure, score: float) -> dict[str, list[int]]:
+    """People and how many of them are missed at a score, of each kind."""
+    kinds = {kind: [0, 0] for kind in ("pair", "sliver", "hidden", "cut", "other")}
+    for name, boxes in truth.items():
+        if not len(boxes):
+            continue
+        counted = measure.counted(name, boxes)
+        seen, width = measure.seen(name, boxes)
+        rows = np.array([row for row in found.get(name, []) if row[0] >= score], float).reshape(-1, 5)
+        hit = set(found_by(rows[:, 1:], rows[:, 0], boxes[counted], measure.overlap).tolist())
+        for number, i in enumerate(np.flatnonzero(counted)):
+            of_kind = kinds[kind_of(boxes, i, seen[i] / area(boxes)[i], width)]
+            of_kind[0] += 1
+            of_kind[1] += number not in hit
+    return kinds
 
 
 def main() -> int:
@@ -135,14 +168,21 @@ def main() -> int:
     parser.add_argument("--least-visible", type=float, default=0.25, help="share of the box; with --masks, people seen less are left out")
     parser.add_argument("--masks-by-person", action="store_true", help="a pixel of the masks is the number of its person, not just not zero")
     parser.add_argument("--ignored", type=Path, help="lines as of the boxes found; what is found there is left out")
+    parser.add_argument("--misses-at", type=float, metavar="SCORE",
+                        help="who is missed at this score, too: people whose box overlaps another one's by more than 0.4 (pair), cut by the left or "
+                        "right side of the image and less than 17 %% of it wide (sliver), less than half seen (hidden), cut and wider; needs --masks")
     parser.add_argument("--others-empty", action="store_true", help="images that the truth does not name show nobody")
     args = parser.parse_args()
     if args.masks_by_person and not args.masks:
         parser.error("--masks-by-person says what --masks are")
+    if args.misses_at is not None and not args.masks:
+        parser.error("--misses-at needs --masks")
     try:
         truth = read_truth(args.truth)
         measure = Measure(args.overlap, args.least_area, args.masks, args.least_visible, args.others_empty, args.masks_by_person)
-        ap = compare(read_rows(args.found, 5), truth, measure, read_rows(args.ignored, 5) if args.ignored else None)
+        found = read_rows(args.found, 5)
+        ap = compare(found, truth, measure, read_rows(args.ignored, 5) if args.ignored else None)
+        kinds = misses_by_kind(found, truth, measure, args.misses_at) if args.misses_at is not None else {}
     except DataError as error:
         print(f"evaluate_boxes.py: {error}")
         return 65
@@ -150,6 +190,8 @@ def main() -> int:
     print("score  recall  precision")
     for score, recall, precision in at_scores(ap):
         print(f"{score:5.2f}  {recall:6.3f}  {precision:9.3f}")
+    for kind, (people, missed) in kinds.items():
+        print(f"{kind:6}  {missed} of {people} missed")
     return 0
 
 

@@ -54,6 +54,20 @@ def suppress(found: Candidates, iou: float = 0.5) -> tuple[np.ndarray, np.ndarra
     return found.boxes[kept], found.scores[kept]
 
 
+def found_by(boxes: np.ndarray, scores: np.ndarray, truth: np.ndarray, overlap: float) -> np.ndarray:
+    """Which true box each box finds, or -1. Each true box is found once, by the most confident box that overlaps it enough."""
+    found = np.full(len(boxes), -1)
+    taken = np.zeros(len(truth), bool)
+    overlaps = iou_matrix(boxes, truth)
+    for i in np.argsort(-scores, kind="stable") if len(truth) else ():
+        candidates = np.where(taken, -1.0, overlaps[i])
+        best = int(candidates.argmax())
+        if candidates[best] >= overlap:
+            taken[best] = True
+            found[i] = best
+    return found
+
+
 class AveragePrecision:
     """Area under the precision-recall curve at one overlap, precision made monotonous. Boxes of one class."""
 
@@ -64,18 +78,10 @@ class AveragePrecision:
         self.hits: list[bool] = []
 
     def add(self, boxes: np.ndarray, scores: np.ndarray, truth: np.ndarray) -> None:
-        """One image. Each true box is found once, by the most confident box that overlaps it enough."""
+        """One image."""
         self.truths += len(truth)
-        taken = np.zeros(len(truth), bool)
-        overlaps = iou_matrix(boxes, truth) if len(boxes) and len(truth) else np.zeros((len(boxes), len(truth)))
-        for i in np.argsort(-scores, kind="stable"):
-            candidates = np.where(taken, -1.0, overlaps[i])
-            best = int(candidates.argmax()) if len(truth) else -1
-            hit = best >= 0 and candidates[best] >= self.overlap
-            if hit:
-                taken[best] = True
-            self.scores.append(float(scores[i]))
-            self.hits.append(bool(hit))
+        self.scores += scores.tolist()
+        self.hits += (found_by(boxes, scores, truth, self.overlap) >= 0).tolist()
 
     def curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Recall, precision and score, from the most confident box on."""

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from dataset import DataError
-from evaluate_boxes import Measure, compare, read_rows, read_truth
+from evaluate_boxes import Measure, compare, misses_by_kind, read_rows, read_truth
 
 
 class EvaluateBoxes(unittest.TestCase):
@@ -110,3 +110,15 @@ class EvaluateBoxes(unittest.TestCase):
 
 if __name__ == "__main__":
     unittest.main()
+
+    def test_misses_by_kind(self):
+        boxes = {"pair": [[100, 0, 199, 99], [130, 0, 229, 99]], "sliver": [[0, 0, 39, 99]], "hidden": [[200, 100, 299, 199]],
+                 "cut": [[300, 0, 399, 99]], "other": [[100, 100, 199, 199]]}
+        truth = {"a": np.array(boxes["pair"] + boxes["cut"] + boxes["hidden"], float), "b": np.array(boxes["sliver"] + boxes["other"], float)}
+        self.mask("a", (100, 0, 229, 99), (300, 0, 399, 99), (200, 160, 299, 199))
+        masks = self.mask("b", (0, 0, 39, 99), (100, 100, 199, 199))
+        found = {"a": [[0.9, 100, 0, 199, 99], [0.8, 120, 0, 210, 99], [0.3, 300, 0, 399, 99]], "b": [[0.2, 0, 0, 39, 99]]}
+        measure = Measure(masks=masks, least_visible=0.25)
+        self.assertEqual(misses_by_kind(found, truth, measure, 0.25), {"pair": [2, 0], "sliver": [1, 1], "hidden": [1, 1], "cut": [1, 0], "other": [1, 1]})
+        self.assertEqual(misses_by_kind(found, truth, measure, 0.85), {"pair": [2, 1], "sliver": [1, 1], "hidden": [1, 1], "cut": [1, 1], "other": [1, 1]})
+        self.assertEqual(misses_by_kind({}, {"c": np.zeros((0, 4))}, measure, 0.5)["pair"], [0, 0])
