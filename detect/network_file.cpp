@@ -21,7 +21,6 @@ namespace posed {
 namespace {
 
 constexpr std::string_view kMagic = "POSEDNET";
-constexpr std::uint32_t kOldestVersion = 1;
 constexpr std::uint32_t kVersionWithBoxesPerAnchor = 2;
 constexpr std::size_t kHeadBytes = 20;
 constexpr std::size_t kChecksumBytes = 4;
@@ -270,7 +269,7 @@ Operation operation_of_kind(std::size_t kind) {
 
 /// The oldest version that can hold the network: what needs nothing new can be read by an older posed.
 std::uint32_t version_for(const Network& network) {
-  return network.metadata().boxes_per_anchor == 1 ? kOldestVersion : kVersionWithBoxesPerAnchor;
+  return network.metadata().boxes_per_anchor == 1 ? kOldestNetworkFormatVersion : kVersionWithBoxesPerAnchor;
 }
 
 void write_body(const Network& network, WeightFormat format, ByteWriter& out) {
@@ -368,11 +367,11 @@ Result<Body> checked_body(std::span<const std::uint8_t> bytes, const std::string
   }
   ByteReader head(bytes.subspan(kMagic.size()));
   const auto version = head.number<std::uint32_t>();
-  if (version < kOldestVersion || version > kNetworkFormatVersion) {
+  if (version < kOldestNetworkFormatVersion || version > kNetworkFormatVersion) {
     return make_error(ErrorCode::Unsupported,
                       fmt::format("{}: is of format version {}, which this posed cannot read; it reads versions {} to {}. "
                                   "Convert the network again with this posed",
-                                  source, version, kOldestVersion, kNetworkFormatVersion));
+                                  source, version, kOldestNetworkFormatVersion, kNetworkFormatVersion));
   }
   const auto body_bytes = head.number<std::uint64_t>();
   if (body_bytes != bytes.size() - kHeadBytes - kChecksumBytes) {

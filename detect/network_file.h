@@ -17,7 +17,8 @@
 /// floats.
 namespace posed {
 
-constexpr std::uint32_t kNetworkFormatVersion = 2;  ///< the newest; version 1 knows one box an anchor and is read as well
+constexpr std::uint32_t kOldestNetworkFormatVersion = 1;  ///< that is read; it knows one box an anchor
+constexpr std::uint32_t kNetworkFormatVersion = 2;
 
 enum class WeightFormat : std::uint8_t { Float32 = 0, Float16 = 1, Int8 = 2 };
 

@@ -1,6 +1,6 @@
 // Any bytes, read as ONNX and as the runner's own network file: accepted or refused with a message, without a crash. Bytes that do
-// not begin as such a file are made its body, with a header of either version and a checksum around them, so that what lies behind those
-// is reached.
+// not begin as such a file are made its body, with a header of either version and a checksum around them, so that what lies behind
+// those is reached.
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -37,7 +37,8 @@ std::vector<std::uint8_t> with_header(std::span<const std::uint8_t> body, std::u
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span<const std::uint8_t> bytes(data, size);
   const bool is_whole = std::string(data, data + size).starts_with("POSEDNET");
-  for (std::uint32_t version = is_whole ? kNetworkFormatVersion : 1; version <= kNetworkFormatVersion; ++version) {
+  for (std::uint32_t version = is_whole ? kNetworkFormatVersion : kOldestNetworkFormatVersion; version <= kNetworkFormatVersion;
+       ++version) {
     const std::vector<std::uint8_t> file = is_whole ? std::vector<std::uint8_t>(data, data + size) : with_header(bytes, version);
     if (const Result<Network> network = parse_network(file, "fuzz.posednet")) {
       (void)simplify(*network);

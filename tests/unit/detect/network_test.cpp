@@ -137,9 +137,11 @@ TEST(Network, MetadataMustFitTheOutputs) {
   };
   EXPECT_THAT(fault([](NetworkMetadata& m) { m.strides = {4}; }), HasSubstr("which stride 4 does not make of an input of 2x4x6"));
   EXPECT_THAT(fault([](NetworkMetadata& m) { m.strides = {2, 4}; }), HasSubstr("2 strides and 1 lists of anchors for 1 outputs"));
-  EXPECT_THAT(fault([](NetworkMetadata& m) { m.anchors[0].pop_back(); }), HasSubstr("1 anchors of 1 boxes and 1 classes take 6 channels"));
+  EXPECT_THAT(fault([](NetworkMetadata& m) { m.anchors[0].pop_back(); }),
+              HasSubstr("1 anchors of 1 boxes and 1 classes take 6 channels"));
   EXPECT_EQ(fault([](NetworkMetadata& m) { m.anchors[0].pop_back(), m.boxes_per_anchor = 2; }), "none");
-  EXPECT_THAT(fault([](NetworkMetadata& m) { m.boxes_per_anchor = 2; }), HasSubstr("2 anchors of 2 boxes and 1 classes take 24 channels"));
+  EXPECT_THAT(fault([](NetworkMetadata& m) { m.boxes_per_anchor = 2; }),
+              HasSubstr("2 anchors of 2 boxes and 1 classes take 24 channels"));
   EXPECT_THAT(fault([](NetworkMetadata& m) { m.boxes_per_anchor = 3; }), HasSubstr("3 boxes an anchor; there may be 1 or 2"));
   EXPECT_THAT(fault([](NetworkMetadata& m) { m.classes.clear(); }), HasSubstr("no classes"));
   EXPECT_THAT(fault([](NetworkMetadata& m) { m.anchors[0][1].width = -1; }), HasSubstr("an anchor of -1 x 4 pixels"));
