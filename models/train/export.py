@@ -3,7 +3,7 @@
 
 Batch normalisation is folded into the convolutions. Decoding is left to whoever runs it; what that takes is in the file's
 properties, as JSON: posed.name, posed.classes, posed.strides, posed.anchors (for each output a list of [width, height] in pixels of
-the input) and posed.input ([channels, height, width]).
+the input) and posed.input ([channels, height, width]); and, where an anchor has two boxes, posed.boxes_per_anchor.
 """
 from __future__ import annotations
 
@@ -64,8 +64,9 @@ def export(network: Yolo, anchors: np.ndarray, classes: list[str], name: str, wi
                       output_names=outputs, do_constant_folding=True)
     model = onnx.load(str(path))
     properties = {"posed.name": name, "posed.classes": classes, "posed.strides": list(strides),
-                  "posed.anchors": np.asarray(anchors).tolist(), "posed.input": [3, height, width],
-                  "posed.boxes_per_anchor": network.options.boxes_per_anchor}
+                  "posed.anchors": np.asarray(anchors).tolist(), "posed.input": [3, height, width]}
+    if network.options.boxes_per_anchor > 1:  # 1 is what a reader takes where nothing is said
+        properties["posed.boxes_per_anchor"] = network.options.boxes_per_anchor
     onnx.helper.set_model_props(model, {key: json.dumps(value) for key, value in properties.items()})
     if half:
         halve_weights(model)

@@ -150,6 +150,13 @@ class Export(WithImages):
         self.assertEqual(model.opset_import[0].version, 12)
         self.assertNotIn("BatchNormalization", {node.op_type for node in model.graph.node})
 
+    def test_properties_say_where_an_anchor_has_two_boxes(self):
+        path = self.path / "two.onnx"
+        export(Yolo(NetworkOptions(width=0.125, boxes_per_anchor=2)), np.ones((4, 3, 2)), ["person"], "two", 96, 64, path)
+        model = onnx.load(str(path))
+        self.assertEqual([p.value for p in model.metadata_props if p.key == "posed.boxes_per_anchor"], ["2"])
+        self.assertEqual([o.type.tensor_type.shape.dim[1].dim_value for o in model.graph.output], [36] * 4)
+
     def test_a_checkpoint_can_look_at_images(self):
         training = self.training("out")
         self.run_silently(training)
