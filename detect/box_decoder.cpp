@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kBoxValues = 5;  // x, y, width, height, objectness
 /// How far from the cell's middle the centre of an anchor's first and second box may be [cells].
-constexpr std::array<float, 2> kCentreReach{1.0F, 2.0F};
+constexpr std::array<float, kMaxBoxesPerAnchor> kCentreReach{1.0F, 2.0F};
 constexpr std::array<int, 3> kYoloxStrides{8, 16, 32};
 constexpr std::size_t kMaxCandidates = 1000;  // that are compared with each other
 
@@ -76,8 +76,9 @@ Status BoxDecoder::check_anchors(std::span<const InferenceOutput> outputs, const
     }
     classes_ = d[1] / boxes - kBoxValues;
   }
-  if (metadata.boxes_per_anchor > static_cast<int>(kCentreReach.size())) {
-    return make_error(ErrorCode::BadData, fmt::format("{} boxes an anchor; there may be 1 or 2", metadata.boxes_per_anchor));
+  if (metadata.boxes_per_anchor > kMaxBoxesPerAnchor) {
+    return make_error(ErrorCode::BadData,
+                      fmt::format("{} boxes an anchor; there may be 1 or {}", metadata.boxes_per_anchor, kMaxBoxesPerAnchor));
   }
   boxes_per_anchor_ = metadata.boxes_per_anchor;
   strides_ = metadata.strides;

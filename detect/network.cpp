@@ -220,8 +220,8 @@ std::string check_metadata(const NetworkMetadata& metadata, const TensorShape& i
   if (metadata.classes.empty()) {
     return "no classes, but strides and anchors";
   }
-  if (metadata.boxes_per_anchor < 1 || metadata.boxes_per_anchor > 2) {
-    return fmt::format("{} boxes an anchor; there may be 1 or 2", metadata.boxes_per_anchor);
+  if (metadata.boxes_per_anchor < 1 || metadata.boxes_per_anchor > kMaxBoxesPerAnchor) {
+    return fmt::format("{} boxes an anchor; there may be 1 or {}", metadata.boxes_per_anchor, kMaxBoxesPerAnchor);
   }
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const int stride = metadata.strides[i];

@@ -34,13 +34,15 @@ struct Anchor {
   float width = 0;   ///< [pixels of the network's input]
   float height = 0;  ///< [pixels of the network's input]
 };
+constexpr int kMaxBoxesPerAnchor = 2;
+
 /// What the values mean, for those who decode them; the strides and anchors are empty where the file says nothing.
 struct NetworkMetadata {
   std::string name;
   std::vector<std::string> classes;
   std::vector<int> strides;                  ///< of each output [pixels of the network's input]
   std::vector<std::vector<Anchor>> anchors;  ///< of each output
-  int boxes_per_anchor = 1;                  ///< 1 or 2; the second one is of somebody who overlaps another person
+  int boxes_per_anchor = 1;                  ///< 1 to kMaxBoxesPerAnchor; the second one is of somebody who overlaps another person
 };
 
 /// The values that a tensor takes, from calibration (detect/calibration.h).

@@ -38,7 +38,6 @@ ObjectDetector::ObjectDetector(std::unique_ptr<InferenceEngine> engine, Letterbo
                                DetectionThresholds thresholds)
     : engine_(std::move(engine)), letterbox_(std::move(letterbox)), decoder_(std::move(decoder)), thresholds_(thresholds) {
   candidates_.reserve(kExpectedCandidates);
-  kept_.reserve(Detections::kCapacity);
 }
 
 Result<RunOutcome> ObjectDetector::detect(ImageView<const std::uint8_t> bgr, const Deadline& deadline, Detections& found) {
@@ -55,14 +54,12 @@ Result<RunOutcome> ObjectDetector::detect(ImageView<const std::uint8_t> bgr, con
   if (outcome->finished) {
     decoder_.decode(engine_->outputs(), thresholds_.score, candidates_);
     suppress_overlaps(candidates_, thresholds_.iou, Detections::kCapacity);
-    kept_.clear();
     for (const Candidate& candidate : candidates_) {
       const Detection detection{letterbox_.to_image(candidate.detection.box), candidate.detection.score};
       if (detection.box.area() > 0) {  // not beside the image
-        kept_.push_back(detection);
+        found.people[found.count++] = detection;
       }
     }
-    found.assign(kept_);
     end_ns = deadline.clock->now_ns();
     ++outcome->steps_run;
   }

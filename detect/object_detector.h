@@ -46,7 +46,6 @@ class ObjectDetector {
   BoxDecoder decoder_;
   DetectionThresholds thresholds_;
   std::vector<Candidate> candidates_;
-  std::vector<Detection> kept_;
 };
 
 }  // namespace posed

@@ -28,8 +28,9 @@ def paired_iou(a: Tensor, b: Tensor) -> Tensor:
     return joint / (a[..., 2:].prod(-1) + b[..., 2:].prod(-1) - joint).clamp(1e-9)
 
 
-def decode_boxes(raw: Tensor, anchors: Tensor, reach: float) -> Tensor:
-    """Raw values (x, y, width, height and whatever else) of M cells as boxes: centre relative to the cell, size; all in cells."""
+def decode_boxes(raw: Tensor, anchors: Tensor, reach: float | Tensor) -> Tensor:
+    """Raw values (x, y, width, height and whatever else) of M cells as boxes: centre relative to the cell, size; all in cells. A reach for
+    all, or M x 1."""
     values = raw[:, :4].sigmoid()
     return torch.cat(((values[:, :2] * 2 - 1) * reach + 0.5, (values[:, 2:] * 2) ** 2 * anchors), 1)
 

@@ -101,7 +101,9 @@ class Measure:
     def counted(self, name: str, boxes: np.ndarray) -> np.ndarray:
         if self.masks is None or not len(boxes):
             return area(boxes) >= self.least_area
-        seen, _ = self.seen(name, boxes)
+        return self.seen_enough(boxes, self.seen(name, boxes)[0])
+
+    def seen_enough(self, boxes: np.ndarray, seen: np.ndarray) -> np.ndarray:
         return (seen >= self.least_area) & (seen >= self.least_visible * area(boxes))
 
 
@@ -147,8 +149,8 @@ def misses_by_kind(found: dict[str, list[list[float]]], truth: dict[str, np.ndar
     for name, boxes in truth.items():
         if not len(boxes):
             continue
-        counted = measure.counted(name, boxes)
         seen, width = measure.seen(name, boxes)
+        counted = measure.seen_enough(boxes, seen)
         rows = np.array([row for row in found.get(name, []) if row[0] >= score], float).reshape(-1, 5)
         hit = set(found_by(rows[:, 1:], rows[:, 0], boxes[counted], measure.overlap).tolist())
         for number, i in enumerate(np.flatnonzero(counted)):

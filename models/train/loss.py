@@ -114,16 +114,17 @@ class DetectionLoss(nn.Module):
         self.strides, self.classes, self.boxes_per_anchor, self.weights = strides, classes, boxes_per_anchor, weights
         self.balance = LAYER_BALANCE[len(strides)]
 
-    def assigned(self, chosen: Tensor, targets: Tensor, matches: Matches, anchors: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def assigned(self, chosen: Tensor, targets: Tensor, matches: Matches, anchors: Tensor, partner: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
         """Whether a match asks an anchor's box for somebody, the number of the target and the CIoU with it: each M x boxes. `chosen`: M x
-        boxes x (5 + classes), the raw values of the matches' cells; `anchors` M x 2 [cells]."""
+        boxes x (5 + classes), the raw values of the matches' cells; `anchors` M x 2 [cells]; `partner` as of
+        partners()."""
         own = matches.target
         first = decode_boxes(chosen[:, 0], anchors, CENTRE_REACH[0])
         everyone = torch.ones_like(own, dtype=torch.bool)
         if self.boxes_per_anchor == 1:
             return everyone[:, None], own[:, None], complete_iou(first, matches.boxes(targets, own))[:, None]
         second = decode_boxes(chosen[:, 1], anchors, CENTRE_REACH[1])
-        other = partners(targets, self.weights.pair_overlap)[own]
+        other = partner[own]
         paired = other >= 0
         other = other.clamp(0)
         own_box, other_box = matches.boxes(targets, own), matches.boxes(targets, other)
@@ -143,6 +144,8 @@ class DetectionLoss(nn.Module):
         """`targets`: T x 6 (image in the batch, class, centre x, centre y, width, height) [pixels of the input]."""
         box_loss = obj_loss = class_loss = heads[0].new_zeros(())
         batch = heads[0].shape[0]
+        # Overlaps are the same in all layers.
+        partner = partners(targets, self.weights.pair_overlap) if self.boxes_per_anchor > 1 else None
         for head, stride, anchors, balance in zip(heads, self.strides, self.anchors, self.balance):
             _, _, height, width = head.shape
             values = head.float().view(batch, len(anchors), self.boxes_per_anchor, 5 + self.classes, height, width).permute(0, 1, 4, 5, 2, 3)
@@ -154,7 +157,7 @@ class DetectionLoss(nn.Module):
             if len(matches):
                 place = matches.image, matches.anchor, matches.row, matches.column
                 chosen = values[place]
-                asked, target, overlap = self.assigned(chosen, in_cells, matches, (anchors / stride)[matches.anchor])
+                asked, target, overlap = self.assigned(chosen, in_cells, matches, (anchors / stride)[matches.anchor], partner)
                 box_loss = box_loss + (1 - overlap[asked]).mean()
                 wanted[place] = overlap.detach().clamp(0) * asked
                 if self.classes > 1:

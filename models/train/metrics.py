@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from boxes import CENTRE_REACH, iou_matrix, suppress_overlaps
+from boxes import CENTRE_REACH, decode_boxes, iou_matrix, suppress_overlaps
 
 
 @dataclass(frozen=True)
@@ -28,22 +28,20 @@ def decode(heads: tuple[Tensor, ...], anchors: np.ndarray, strides: tuple[int, .
     batch = heads[0].shape[0]
     parts: list[list[tuple[np.ndarray, ...]]] = [[] for _ in range(batch)]
     begin = 0
-    reach = np.array(CENTRE_REACH)
     for head, stride, layer in zip(heads, strides, anchors):
         _, _, height, width = head.shape
-        shape = batch, len(layer), boxes_per_anchor, 5 + classes, height, width
-        values = head.detach().float().view(shape).sigmoid().numpy()
-        confidence = values[:, :, :, 4]
+        values = head.detach().float().view(batch, len(layer), boxes_per_anchor, 5 + classes, height, width)
+        confidence = values[:, :, :, 4].sigmoid()
         if classes > 1:
-            confidence = confidence * values[:, :, :, 5:].max(3)
-        found = image, anchor, which, row, column = np.nonzero(confidence >= score)
-        v = values[image, anchor, which, :, row, column]
-        centre = ((v[:, :2] * 2 - 1) * reach[which, None] + 0.5 + np.stack((column, row), 1)) * stride
-        size = (v[:, 2:4] * 2) ** 2 * np.asarray(layer)[anchor]
-        boxes = np.concatenate((centre - size / 2, centre + size / 2), 1)
+            confidence = confidence * values[:, :, :, 5:].sigmoid().amax(3)
+        found = image, anchor, which, row, column = torch.nonzero(confidence >= score, as_tuple=True)
+        raw = values[image, anchor, which, :, row, column]
+        boxes = decode_boxes(raw, torch.as_tensor(layer)[anchor] / stride, torch.tensor(CENTRE_REACH)[which, None])
+        centre, size = (boxes[:, :2] + torch.stack((column, row), 1)) * stride, boxes[:, 2:] * stride
+        boxes = torch.cat((centre - size / 2, centre + size / 2), 1)
         places = begin + (anchor * height + row) * width + column
         for i in range(batch):
-            parts[i].append((boxes[image == i], confidence[found][image == i], places[image == i]))
+            parts[i].append(tuple(part[image == i].numpy() for part in (boxes, confidence[found], places)))
         begin += len(layer) * height * width
     return [Candidates(*(np.concatenate(p) for p in zip(*of_layers))) for of_layers in parts]
 

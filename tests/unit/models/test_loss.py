@@ -155,7 +155,7 @@ class TwoBoxes(unittest.TestCase):
         whose = {place: set() for place in found.places}
         for place, person in zip(found.places, overlaps.argmax(1)):
             whose[place].add(int(person))
-        groups = [people for people in whose.values()]
+        groups = list(whose.values())
         self.assertTrue(all(people <= {0, 1} or people == {2} for people in groups))
         self.assertGreater(groups.count({0, 1}), len(groups) / 3)
         self.assertIn({2}, groups)
@@ -173,7 +173,7 @@ class TwoBoxes(unittest.TestCase):
                 share = (matches.boxes(targets, torch.full_like(matches.target, order[which]))[:, :2] - 0.5) / reach / 2 + 0.5
                 chosen[:, which, :2] = share.clamp(0.01, 0.99).logit()
                 chosen[:, which, 2:4] = (0.5 * torch.tensor(2 / 3).sqrt()).logit()
-            asked, target, overlap = loss.assigned(chosen, targets, matches, loss.anchors[2][matches.anchor] / 32)
+            asked, target, overlap = loss.assigned(chosen, targets, matches, loss.anchors[2][matches.anchor] / 32, partners(targets, 0.3))
             self.assertTrue(asked.all())
             self.assertEqual(target.tolist(), [list(order)] * len(matches))
             self.assertGreater(float(overlap.min()), 0.95)
