@@ -13,9 +13,9 @@ import numpy as np
 import onnx
 import torch
 
+from checkpoints import load_checkpoint
 from dataset import DataError, letterbox
 from metrics import Candidates, decode, suppress
-from network import NetworkOptions, Yolo
 
 SCORE_FLOOR = 0.01  # what is less certain is not looked at
 YOLOX_STRIDES = (8, 16, 32)
@@ -33,20 +33,6 @@ def to_image(boxes: np.ndarray, scale: float, left: int, top: int, shape: tuple[
     """Boxes of the letterboxed input in pixels of the image, cut to it."""
     height, width = shape[:2]
     return np.clip((boxes - [left, top, left, top]) / scale, 0, [width, height, width, height])
-
-
-def read_checkpoint(path: Path) -> dict:
-    if not path.is_file():
-        raise DataError(f"{path}: no such file")
-    return torch.load(path, map_location="cpu")
-
-
-def load_checkpoint(path: Path) -> tuple[Yolo, dict]:
-    """The averaged network (EMA) of a checkpoint, ready to look, and all that the checkpoint holds."""
-    saved = read_checkpoint(path)
-    network = Yolo(NetworkOptions(**saved["options"]))
-    network.load_state_dict(saved["ema"])
-    return network.eval(), saved
 
 
 class CheckpointDetector:

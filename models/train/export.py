@@ -19,8 +19,8 @@ from onnx import numpy_helper
 from torch import nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+from checkpoints import load_checkpoint
 from dataset import DataError
-from engines import load_checkpoint
 from network import Conv, Yolo
 
 OPSET = 12

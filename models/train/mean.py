@@ -11,8 +11,8 @@ from pathlib import Path
 
 import torch
 
+from checkpoints import read_checkpoint
 from dataset import DataError
-from engines import read_checkpoint
 
 KEPT = ("options", "anchors", "input", "settings")
 

@@ -17,8 +17,9 @@ import cv2
 import numpy as np
 import torch
 
+from checkpoints import load_checkpoint
 from dataset import DataError, read_folder
-from engines import OnnxDetector, load_checkpoint
+from engines import OnnxDetector
 from evaluate import measure
 from export import export
 from network import NetworkOptions, Yolo, parameter_count

@@ -6,7 +6,6 @@ import argparse
 import copy
 import csv
 import math
-import os
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from torch import Tensor, nn
 import fused_norm
 from anchors import fit_anchors
 from augment import AUGMENTATIONS, COMPOSITE, Augmentation, augmented
+from checkpoints import read_checkpoint, save_checkpoint
 from composites import Compositor, read_cut_outs
 from dataset import DataError, Sample, letterbox, read_folder
 from loss import DetectionLoss
@@ -150,11 +150,15 @@ def fitted_anchors(samples: list[Sample], s: Settings, layers: int, seed: int) -
     return fit_anchors(sizes, layers * ANCHORS_PER_LAYER, seed).reshape(layers, ANCHORS_PER_LAYER, 2).astype(float).round(1)
 
 
-def save_checkpoint(path: Path, state: dict) -> None:
-    """Replaces the file in one go: whoever is interrupted keeps the last whole one."""
-    temporary = path.with_suffix(".part")
-    torch.save(state, temporary)
-    os.replace(temporary, path)
+def weights_to_start_from(path: Path, wanted: NetworkOptions) -> tuple[dict[str, Tensor], np.ndarray]:
+    """Averaged weights (EMA) of a checkpoint for a network of these options, and its anchors. Two boxes an anchor can be begun from one."""
+    start = read_checkpoint(path)
+    had = NetworkOptions(**start["options"])
+    differences = [f"{name} {theirs}, not {ours}" for (name, theirs), ours in zip(had.to_dict().items(), wanted.to_dict().values())
+                   if theirs != ours and not (name == "boxes_per_anchor" and theirs < ours)]
+    if differences:
+        raise DataError(f"{path}: a network of {'; '.join(differences)}")
+    return with_second_boxes(start["ema"], had, wanted), np.array(start["anchors"])
 
 
 class Training:
@@ -165,7 +169,7 @@ class Training:
         self.out = args.out
         self.out.mkdir(parents=True, exist_ok=True)
         self.checkpoint_path = self.out / "checkpoint.pt"
-        saved = torch.load(self.checkpoint_path, map_location="cpu") if self.checkpoint_path.exists() else None
+        saved = read_checkpoint(self.checkpoint_path) if self.checkpoint_path.exists() else None
         self.settings = Settings(**saved["settings"]) if saved else replace(
             PRESETS[args.preset], **{k: v for k, v in vars(args).items() if k in Settings.__dataclass_fields__ and v is not None})
         torch.manual_seed(args.seed)
@@ -181,9 +185,8 @@ class Training:
         if saved:
             self.network.load_state_dict(saved["network"])
         elif args.start_from:
-            start = torch.load(args.start_from, map_location="cpu")
-            self.network.load_state_dict(with_second_boxes(start["ema"], NetworkOptions(**start["options"]), options))
-            self.anchors = np.array(start["anchors"])
+            weights, self.anchors = weights_to_start_from(args.start_from, options)
+            self.network.load_state_dict(weights)
         self.network.to(self.device, memory_format=torch.channels_last)
         self.ema = MovingAverage(self.network, self.settings.ema_half_life_steps)
         self.optimizer = make_optimizer(self.network, self.settings)

@@ -13,8 +13,9 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from checkpoints import read_checkpoint, save_checkpoint
+from dataset import DataError
 from network import NetworkOptions, Yolo, parameter_count
-from train import save_checkpoint
 
 
 class WidenError(Exception):
@@ -53,9 +54,12 @@ def main() -> int:
     parser.add_argument("--width", type=float, required=True, help="of the wider network")
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
-    saved = torch.load(args.checkpoint, map_location="cpu")
     try:
+        saved = read_checkpoint(args.checkpoint)
         network = widened(saved["ema"], NetworkOptions(**saved["options"]), args.width, args.seed)
+    except DataError as error:
+        print(f"widen.py: {error}")
+        return 65
     except WidenError as error:
         print(f"widen.py: {args.checkpoint}: {error}")
         return 65

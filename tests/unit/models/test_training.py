@@ -12,6 +12,7 @@ import numpy as np
 import onnx
 import torch
 
+from checkpoints import read_checkpoint
 from dataset import DataError
 from engines import CheckpointDetector, OnnxDetector
 from export import export
@@ -80,6 +81,29 @@ class Resuming(WithImages):
     def test_a_missing_folder_is_an_error_of_the_data(self):
         with self.assertRaisesRegex(DataError, "no such folder"):
             Training(parse_arguments(["--data", str(self.path / "absent"), "--out", str(self.path / "x")]))
+
+
+class StartingFrom(WithImages):
+    def setUp(self):
+        super().setUp()
+        self.run_silently(self.training("first", "--boxes-per-anchor", "2"), last_step=1)
+        self.checkpoint = self.path / "first" / "checkpoint.pt"
+
+    def test_begins_with_the_averaged_weights_and_the_anchors(self):
+        before = read_checkpoint(self.checkpoint)
+        training = self.training("second", "--boxes-per-anchor", "2", "--start-from", str(self.checkpoint), "--seed", "3")
+        for name, value in training.network.state_dict().items():
+            torch.testing.assert_close(value, before["ema"][name], rtol=0, atol=0)
+        self.assertEqual(training.anchors.tolist(), before["anchors"])
+
+    def test_a_network_that_is_another_one_is_an_error_that_says_how(self):
+        for more, words in (((), "boxes_per_anchor 2, not 1"), (("--boxes-per-anchor", "2", "--no-cbam"), "cbam True, not False")):
+            with self.assertRaisesRegex(DataError, words):
+                self.training("second", *more, "--start-from", str(self.checkpoint))
+
+    def test_a_missing_file_is_an_error_that_names_it(self):
+        with self.assertRaisesRegex(DataError, "nothing.pt: no such file"):
+            self.training("second", "--start-from", str(self.path / "nothing.pt"))
 
 
 class Schedule(unittest.TestCase):
