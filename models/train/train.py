@@ -43,6 +43,7 @@ class Settings:
     close_mosaic: float = 0.85  # share of the training after which there are no mosaics
     augmentation: str = "general"  # of augment.AUGMENTATIONS
     composites: float = 0.4  # share of images that are composites, where there are cut-outs
+    size_steps: int = 0  # sides of a step's images are up to so many times 64 pixels shorter or longer, drawn for each step
 
 
 PRESETS = {
@@ -68,6 +69,15 @@ class MovingAverage:
                     mine.lerp_(theirs, 1 - decay)
                 else:
                     mine.copy_(theirs)
+
+
+SIZE_STEP_PX = 64  # the largest stride: sides of an input are multiples of it
+
+
+def input_size(s: Settings, seed: int, step: int) -> tuple[int, int]:
+    """Width and height of a step's images, the same for all of a team."""
+    longer = SIZE_STEP_PX * int(np.random.default_rng((seed, 2, step)).integers(-s.size_steps, s.size_steps + 1))
+    return s.width_px + longer, s.height_px + longer
 
 
 class Batches(torch.utils.data.Dataset):
@@ -96,13 +106,14 @@ class Batches(torch.utils.data.Dataset):
         rng = np.random.default_rng((self.seed, 1, number))
         mosaics = step < s.close_mosaic * self.steps and not self.late
         options = self.augmentation if mosaics else replace(self.augmentation, mosaic=0.0)
+        width, height = input_size(s, self.seed, step)
         images, targets = [], []
         for i in range(s.batch):
             sample = self.samples[order[(number % per_epoch * s.batch + i) % len(order)]]
             how = options
             if self.compositor and rng.random() < s.composites:
                 sample, how = self.compositor.sample(rng), COMPOSITE
-            image, labels, boxes = augmented(sample, self.samples, s.width_px, s.height_px, how, rng)
+            image, labels, boxes = augmented(sample, self.samples, width, height, how, rng)
             images.append(torch.from_numpy(image[:, :, ::-1].copy()).permute(2, 0, 1))
             for label, (x0, y0, x1, y1) in zip(labels, boxes):
                 targets.append([i, label, (x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0])
@@ -176,6 +187,9 @@ class Training:
         options = NetworkOptions(**saved["options"]) if saved else NetworkOptions(
             width=args.width, ghost=not args.no_ghost, cbam=not args.no_cbam, fourth_layer=not args.no_fourth_layer,
             boxes_per_anchor=args.boxes_per_anchor)
+        if min(self.settings.width_px, self.settings.height_px) <= self.settings.size_steps * SIZE_STEP_PX:
+            raise DataError(f"{self.settings.size_steps} steps of {SIZE_STEP_PX} pixels leave nothing of images of "
+                            f"{self.settings.width_px}x{self.settings.height_px}")
         self.samples = [s for folder in args.data for s in read_folder(folder, options.classes, args.longest_side)]
         self.valid = read_folder(args.valid, options.classes) if args.valid else []
         self.compositor = self.read_compositor() if args.cut_outs else None

@@ -58,6 +58,7 @@ posed_test_packages=(
   "python3|reports and reference computations of tests"
   "python3-numpy|reference computations of tests"
   "python3-torch|tests of the training code"
+  "python3-opencv|tests of the training code"
   "python3-onnx|tests of the training code"
   "iproute2|network namespaces for the message tests"
   "systemd|checks of the service's unit"

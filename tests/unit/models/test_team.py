@@ -8,7 +8,7 @@ import unittest
 import torch
 
 from augment import Augmentation
-from dataset import read_folder
+from dataset import DataError, read_folder
 from team import Team, fork_team
 from test_training import WithImages
 from train import Batches, Settings
@@ -50,6 +50,18 @@ class Teams(WithImages):
         self.assertTrue(torch.equal(first[1][0], alone[2][0]))
         self.assertTrue(torch.equal(second[1][0], alone[3][0]))
         self.assertFalse(torch.equal(first[1][0], second[1][0]))
+
+    def test_all_places_have_images_of_the_size_drawn_for_the_step(self):
+        samples = read_folder(self.path / "data")
+        settings = Settings(width_px=192, height_px=128, size_steps=1, batch=1)
+        places = [Batches(samples, settings, Augmentation(), 0, 30, 0, None, Team(rank, 2)) for rank in (0, 1)]
+        shapes = [[tuple(batches[step][0].shape[2:]) for step in range(30)] for batches in places]
+        self.assertEqual(shapes[0], shapes[1])
+        self.assertEqual(set(shapes[0]), {(64, 128), (128, 192), (192, 256)})
+
+    def test_sizes_that_leave_nothing_are_refused(self):
+        with self.assertRaisesRegex(DataError, "1 steps of 64 pixels leave nothing of images of 64x64"):
+            self.training("small", "--size-steps", "1")
 
 
 if __name__ == "__main__":
