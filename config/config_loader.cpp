@@ -7,6 +7,7 @@
 
 #include "config/config_schema.h"
 #include "config/data_file.h"
+#include "config/model_name.h"
 #include "config/strict_reader.h"
 #include "config/text_file.h"
 
@@ -124,8 +125,10 @@ void find_models(StrictReader& reader, const std::vector<std::filesystem::path>&
   }
   reader.require(!detector.models.empty(), {"detector.models"}, "names no file; set detector.enabled = false to look for nobody");
   for (std::string& model : detector.models) {
-    if (const Result<std::filesystem::path> file = find_file(model, folders, model_folders())) {
-      model = file->string();
+    ModelName name = parse_model_name(model);
+    if (const Result<std::filesystem::path> file = find_file(name.file, folders, model_folders())) {
+      name.file = file->string();
+      model = to_string(name);
     } else {
       reader.require(false, {"detector.models"}, fmt::format("{}: {}", model, file.error().message));
     }

@@ -113,7 +113,9 @@ void add_detector(SchemaBuilder& schema, DetectorConfig& c) {
       .key("enabled", BoolField{&c.enabled}, "", "Look for people.")
       .key("models", TextListField{&c.models, {"the name of a file", is_file_name}, kMaxModels}, "",
            "Networks, from cheap to costly: for each frame the largest whose 95 % quantile of the time fits `budget_s`. A relative "
-           "name is looked for beside this file, then in the folders of $POSED_MODEL_PATH, then among the shipped models.")
+           "name is looked for beside this file, then in the folders of $POSED_MODEL_PATH, then among the shipped models. "
+           "`@WIDTHxHEIGHT` after it is the size of the images it is to look at [pixels], if not that of the file: the same network "
+           "for less, or more, time.")
       .key("budget_s", real(c.budget_s, 0.001, 10.0), "s",
            "A frame that takes longer is given up, and counted. Without effect in `lockstep`.")
       .key("lockstep_model", integer(c.lockstep_model, 0, static_cast<int>(kMaxModels) - 1), "",

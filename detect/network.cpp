@@ -305,6 +305,21 @@ Result<Network> Network::create(std::string source, TensorShape input, std::vect
   return network;
 }
 
+Result<Network> Network::with_input(int width, int height) const {
+  const int stride = metadata_.strides.empty() ? 1 : *std::max_element(metadata_.strides.begin(), metadata_.strides.end());
+  if (width < 1 || height < 1 || width % stride != 0 || height % stride != 0) {
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("{}: an input of {}x{}: its sides must be multiples of {}", source_, width, height, stride));
+  }
+  Result<Network> resized = create(source_, {input().channels, height, width}, nodes_, outputs_, metadata_);
+  if (!resized) {
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("{}; so it is with an input of {}x{}", resized.error().message, width, height));
+  }
+  resized->ranges_ = ranges_;
+  return resized;
+}
+
 Status Network::set_ranges(std::vector<ValueRange> ranges) {
   if (ranges.size() != shapes_.size()) {
     return make_error(ErrorCode::BadData,

@@ -62,6 +62,11 @@ class Network {
   static Result<Network> create(std::string source, TensorShape input, std::vector<Node> nodes, std::vector<int> outputs,
                                 NetworkMetadata metadata);
 
+  /// The same network, value ranges and all, for images of another size. Its anchors stay: it finds people best who are as large, in
+  /// pixels of the input, as those it was trained on. Error: InvalidArgument, where a side is no multiple of the largest stride or
+  /// an operation does not fit that size.
+  Result<Network> with_input(int width, int height) const;
+
   const std::string& source() const { return source_; }
   const TensorShape& input() const { return shapes_.front(); }
   const std::vector<Node>& nodes() const { return nodes_; }

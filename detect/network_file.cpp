@@ -14,7 +14,6 @@
 #include "core/file_io.h"
 #include "detect/half.h"
 #include "detect/network_passes.h"
-#include "detect/onnx_reader.h"
 #include "detect/quantization_plan.h"
 
 namespace posed {
@@ -438,13 +437,8 @@ Result<Network> read_network(const std::filesystem::path& path) {
   return parse_network(bytes, path.string());
 }
 
-Result<Network> load_network(const std::filesystem::path& path) {
-  std::vector<std::uint8_t> bytes;
-  if (const Status read = read_file(path, bytes); !read) {
-    return tl::unexpected<Error>(read.error());
-  }
-  const bool own = bytes.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
-  return own ? parse_network(bytes, path.string()) : parse_onnx(bytes, path.string());
+bool is_network_file(std::span<const std::uint8_t> bytes) {
+  return bytes.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
 }
 
 }  // namespace posed

@@ -31,7 +31,7 @@ Result<Network> read_network(const std::filesystem::path& path);
 /// The same of a file in memory; `source` names it in messages.
 Result<Network> parse_network(std::span<const std::uint8_t> bytes, const std::string& source);
 
-/// Reads either kind by what the file begins with. Errors as in `read_network` and `read_onnx`.
-Result<Network> load_network(const std::filesystem::path& path);
+/// Whether a file's bytes begin as one of these.
+bool is_network_file(std::span<const std::uint8_t> bytes);
 
 }  // namespace posed

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "detect/network_file.h"
+#include "detect/network_loader.h"
 #include "detect/network_runner.h"
 #include "detect/opencv_network.h"
 
@@ -39,8 +39,8 @@ constexpr bool kEightBitsAreFast = true;
 constexpr bool kEightBitsAreFast = false;
 #endif
 
-Result<std::unique_ptr<ObjectDetector>> load_own(const DetectorConfig& config, const std::string& file) {
-  Result<Network> network = load_network(file);
+Result<std::unique_ptr<ObjectDetector>> load_own(const DetectorConfig& config, const ModelName& name) {
+  Result<Network> network = load_network(name);
   if (!network) {
     return tl::unexpected<Error>(network.error());
   }
@@ -53,8 +53,12 @@ Result<std::unique_ptr<ObjectDetector>> load_own(const DetectorConfig& config, c
                                 thresholds(config));
 }
 
-Result<std::unique_ptr<ObjectDetector>> load_opencv(const DetectorConfig& config, const std::string& file) {
-  Result<std::unique_ptr<OpenCvNetwork>> engine = OpenCvNetwork::create(file);
+Result<std::unique_ptr<ObjectDetector>> load_opencv(const DetectorConfig& config, const ModelName& name) {
+  if (name.has_size()) {
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("{}: OpenCV takes networks at the size of their file", to_string(name)));
+  }
+  Result<std::unique_ptr<OpenCvNetwork>> engine = OpenCvNetwork::create(name.file);
   if (!engine) {
     return tl::unexpected<Error>(engine.error());
   }
@@ -84,8 +88,8 @@ Error blame_config(const Error& error) {
 
 }  // namespace
 
-Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const std::string& file) {
-  return config.engine == DetectorEngine::Posed ? load_own(config, file) : load_opencv(config, file);
+Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const ModelName& name) {
+  return config.engine == DetectorEngine::Posed ? load_own(config, name) : load_opencv(config, name);
 }
 
 Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorConfig& config, int image_width, int image_height,
@@ -99,7 +103,7 @@ Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorCon
   const ImageView<const std::uint8_t> bgr{grey.data(), image_width, image_height, std::ptrdiff_t{3} * image_width, 3};
   std::vector<Loaded> loaded;
   for (const std::string& file : config.models) {
-    Result<std::unique_ptr<ObjectDetector>> model = load_object_detector(config, file);
+    Result<std::unique_ptr<ObjectDetector>> model = load_object_detector(config, parse_model_name(file));
     if (!model) {
       return tl::unexpected<Error>(blame_config(model.error()));
     }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "config/config.h"
+#include "config/model_name.h"
 #include "core/clock.h"
 #include "core/detections.h"
 #include "core/image_view.h"
@@ -41,7 +42,7 @@ class PersonDetector {
   Result<DetectionOutcome> detect_unhurried(const RgbdFrame& frame, std::size_t model, Detections& found);
 
   std::size_t model_count() const { return models_.size(); }
-  /// File name of a model without its folder.
+  /// A model as the configuration names it, without its folder.
   const std::string& model_name(std::size_t model) const { return names_[model]; }
   /// What a run of a model took when the detector was made.
   TimeNs unloaded_ns(std::size_t model) const { return unloaded_ns_[model]; }
@@ -60,6 +61,6 @@ class PersonDetector {
 };
 
 /// Makes one model ready as the configuration says: for tools that look at single images. Errors as in `PersonDetector::create`.
-Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const std::string& file);
+Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const ModelName& name);
 
 }  // namespace posed

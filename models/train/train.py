@@ -71,7 +71,7 @@ class MovingAverage:
                     mine.copy_(theirs)
 
 
-SIZE_STEP_PX = 64  # the largest stride: sides of an input are multiples of it
+SIZE_STEP_PX = 64  # a multiple of the largest stride, as the sides of an input are
 
 
 def input_size(s: Settings, seed: int, step: int) -> tuple[int, int]:

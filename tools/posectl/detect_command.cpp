@@ -99,12 +99,12 @@ Result<std::pair<std::unique_ptr<ObjectDetector>, std::string>> load_model(const
   if (options.model.empty() && detector.models.empty()) {
     return make_error(ErrorCode::InvalidConfig, "the configuration names no model; name one by --model");
   }
-  const std::string file = options.model.empty() ? detector.models.back() : options.model;
-  Result<std::unique_ptr<ObjectDetector>> loaded = load_object_detector(detector, file);
+  const std::string name = options.model.empty() ? detector.models.back() : options.model;
+  Result<std::unique_ptr<ObjectDetector>> loaded = load_object_detector(detector, parse_model_name(name));
   if (!loaded) {
     return tl::unexpected<Error>(loaded.error());
   }
-  return std::pair(std::move(*loaded), std::filesystem::path(file).filename().string());
+  return std::pair(std::move(*loaded), std::filesystem::path(name).filename().string());
 }
 
 std::string table_row(const std::string& name, const Detection& d) {
@@ -199,7 +199,8 @@ void add_detect_command(CLI::App& parent, const Console& console, int& exit_code
   command->add_option("images", options->images, "Image files (PNG, JPEG), or folders of them")->required();
   command->add_option("--config", options->config,
                       "Configuration of the daemon, for its [detector]; built-in defaults unless given");
-  command->add_option("--model", options->model, "Network file; the last of detector.models unless given");
+  command->add_option("--model", options->model,
+                      "Network, with @WIDTHxHEIGHT for another input than the file's; the last of detector.models unless given");
   command->add_option("--score", options->score, "Least confidence; that of the configuration unless given")
       ->check(CLI::Range(0.001, 0.999));
   command->add_option("--csv", options->csv,

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <utility>
 
 #include <fmt/ostream.h>
 
-#include "detect/network_file.h"
+#include "detect/network_loader.h"
 #include "detect/network_runner.h"
 #include "detect/opencv_network.h"
 
@@ -33,7 +34,7 @@ void fill_with_noise(std::span<float> input) {
 }
 
 template <typename Engine>
-Status add_engine(Result<std::unique_ptr<Engine>> made, const std::filesystem::path& file, std::vector<BenchEngine>& engines) {
+Status add_engine(Result<std::unique_ptr<Engine>> made, const ModelName& name, std::vector<BenchEngine>& engines) {
   if (!made) {
     return tl::unexpected<Error>(made.error());
   }
@@ -42,32 +43,33 @@ Status add_engine(Result<std::unique_ptr<Engine>> made, const std::filesystem::p
     bench.runner = made->get();
     bench.steps_ns.resize((*made)->step_count());
   }
-  bench.timing.label = fmt::format("{}, {}", file.filename().string(), (*made)->name());
+  bench.timing.label = fmt::format("{}, {}", std::filesystem::path(to_string(name)).filename().string(), (*made)->name());
   bench.engine = std::move(*made);
   fill_with_noise(bench.engine->input());
   engines.push_back(std::move(bench));
   return {};
 }
 
-Status add_engines(const ModelBenchRequest& request, const std::filesystem::path& file, std::vector<BenchEngine>& engines) {
-  const bool by_opencv = request.against_opencv && file.extension() == ".onnx";
-  const Result<Network> network = load_network(file);
+Status add_engines(const ModelBenchRequest& request, const ModelName& name, std::vector<BenchEngine>& engines) {
+  // OpenCV takes a network at the size of its file.
+  const bool by_opencv = request.against_opencv && !name.has_size() && std::filesystem::path(name.file).extension() == ".onnx";
+  const Result<Network> network = load_network(name);
   if (!network && network.error().code == ErrorCode::Unsupported && by_opencv) {
-    return add_engine(OpenCvNetwork::create(file), file, engines);  // one of another kind, to compare with
+    return add_engine(OpenCvNetwork::create(name.file), name, engines);  // one of another kind, to compare with
   }
   if (!network) {
     return tl::unexpected<Error>(network.error());
   }
   Status added;
   if (request.float32) {
-    added = add_engine(NetworkRunner::create(*network, Precision::Float32), file, engines);
+    added = add_engine(NetworkRunner::create(*network, Precision::Float32), name, engines);
   }
   // Asked for alone, eight bits of a network that has none are an error; with the other precision they are left out.
   if (added && request.int8 && (!network->ranges().empty() || !request.float32)) {
-    added = add_engine(NetworkRunner::create(*network, Precision::Int8), file, engines);
+    added = add_engine(NetworkRunner::create(*network, Precision::Int8), name, engines);
   }
   if (added && by_opencv) {
-    added = add_engine(OpenCvNetwork::create(file), file, engines);
+    added = add_engine(OpenCvNetwork::create(name.file), name, engines);
   }
   return added;
 }
@@ -120,8 +122,8 @@ TimeNs quantile_ns(std::vector<TimeNs> durations_ns, double p) {
 
 Status bench_models(const ModelBenchRequest& request, std::ostream& out) {
   std::vector<BenchEngine> engines;
-  for (const std::filesystem::path& file : request.files) {
-    if (const Status added = add_engines(request, file, engines); !added) {
+  for (const std::string& network : request.networks) {
+    if (const Status added = add_engines(request, parse_model_name(network), engines); !added) {
       return added;
     }
   }

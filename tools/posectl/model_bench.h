@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <memory>
 #include <ostream>
 #include <string>
@@ -15,10 +14,10 @@ namespace posed {
 
 /// What to time.
 struct ModelBenchRequest {
-  std::vector<std::filesystem::path> files;
+  std::vector<std::string> networks;  ///< config/model_name.h
   bool float32 = true;
   bool int8 = true;             ///< of files that are calibrated
-  bool against_opencv = false;  ///< of ONNX files
+  bool against_opencv = false;  ///< of ONNX files named without a size
   std::size_t runs = 200;
   bool steps = false;  ///< also each step of the runners
 };

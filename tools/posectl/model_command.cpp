@@ -13,6 +13,7 @@
 #include "core/clock.h"
 #include "detect/calibration.h"
 #include "detect/network_file.h"
+#include "detect/network_loader.h"
 #include "detect/network_passes.h"
 #include "tools/posectl/commands.h"
 #include "tools/posectl/exit_code.h"
@@ -25,8 +26,10 @@
 namespace posed {
 namespace {
 
+constexpr const char* kNetworkHelp = "Network (.onnx or .posednet), with @WIDTHxHEIGHT for another input than the file's";
+
 struct ConvertOptions {
-  std::filesystem::path from;
+  std::string from;
   std::filesystem::path to;
   WeightFormat weights = WeightFormat::Float32;
   std::vector<std::filesystem::path> images;
@@ -55,15 +58,15 @@ void print_outputs(const Network& network, std::ostream& out) {
   }
 }
 
-int run_info(const std::filesystem::path& path, const Console& console) {
-  const Result<Network> network = load_network(path);
+int run_info(const std::string& name, const Console& console) {
+  const Result<Network> network = load_network(parse_model_name(name));
   const Result<Network> simple = network ? simplify(*network) : network;
   if (!simple) {
     return report_error(console.err, simple.error());
   }
   const NetworkMetadata& metadata = network->metadata();
   const TensorShape& input = network->input();
-  fmt::print(console.out, "{}: {}\n", path.string(), metadata.name.empty() ? "a network without a name" : metadata.name);
+  fmt::print(console.out, "{}: {}\n", name, metadata.name.empty() ? "a network without a name" : metadata.name);
   fmt::print(console.out, "  input: {}x{}x{}\n", input.channels, input.height, input.width);
   fmt::print(console.out, "  classes: {}\n",
              metadata.classes.empty() ? "not said" : fmt::format("{}", fmt::join(metadata.classes, ", ")));
@@ -101,7 +104,7 @@ int run_convert(const ConvertOptions& options, const Console& console) {
   if (const Status writable = check_writable(options.to); !writable) {
     return report_error(console.err, writable.error());
   }
-  const Result<Network> network = load_network(options.from);
+  const Result<Network> network = load_network(parse_model_name(options.from));
   if (!network) {
     return report_error(console.err, network.error());
   }
@@ -128,17 +131,17 @@ int run_bench(const BenchOptions& options, const Console& console) {
 }
 
 void add_info(CLI::App& parent, const Console& console, int& exit_code) {
-  auto path = std::make_shared<std::filesystem::path>();
+  auto name = std::make_shared<std::string>();
   CLI::App* command = parent.add_subcommand("info", "Print what a network file holds");
-  command->add_option("file", *path, "Network (.onnx or .posednet)")->required();
-  command->callback([path, &console, &exit_code] { exit_code = run_info(*path, console); });
+  command->add_option("file", *name, kNetworkHelp)->required();
+  command->callback([name, &console, &exit_code] { exit_code = run_info(*name, console); });
 }
 
 void add_convert(CLI::App& parent, const Console& console, int& exit_code) {
   auto options = std::make_shared<ConvertOptions>();
   CLI::App* command =
       parent.add_subcommand("convert", "Write a network as the detector's own file, calibrated if images are given");
-  command->add_option("from", options->from, "Network (.onnx or .posednet)")->required();
+  command->add_option("from", options->from, kNetworkHelp)->required();
   command->add_option("to", options->to, "File to write (.posednet)")->required();
   const std::map<std::string, WeightFormat> formats{
       {"f32", WeightFormat::Float32}, {"f16", WeightFormat::Float16}, {"int8", WeightFormat::Int8}};
@@ -158,11 +161,11 @@ void add_convert(CLI::App& parent, const Console& console, int& exit_code) {
 void add_bench(CLI::App& parent, const Console& console, int& exit_code) {
   auto options = std::make_shared<BenchOptions>();
   CLI::App* command = parent.add_subcommand("bench", "Time networks against each other on one thread, taking turns");
-  command->add_option("files", options->request.files, "Networks (.onnx or .posednet)")->required();
+  command->add_option("files", options->request.networks, kNetworkHelp)->required();
   command->add_option("--precision", options->precision, "f32, int8, or all: f32, and int8 of calibrated networks")
       ->check(CLI::IsMember({"f32", "int8", "all"}))
       ->capture_default_str();
-  command->add_flag("--against-opencv", options->request.against_opencv, "Also time OpenCV's DNN module on the ONNX files");
+  command->add_flag("--against-opencv", options->request.against_opencv, "Also time OpenCV's DNN module on the ONNX files named without a size");
   command->add_option("--runs", options->request.runs, "How many runs of each")->check(CLI::PositiveNumber)->capture_default_str();
   command->add_flag("--steps", options->request.steps, "Also print what each step took");
   command->callback([options, &console, &exit_code] { exit_code = run_bench(*options, console); });

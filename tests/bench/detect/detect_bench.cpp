@@ -10,6 +10,7 @@
 #include "detect/attention_block.h"
 #include "detect/kernels/tensor_kernels.h"
 #include "detect/network_file.h"
+#include "detect/network_loader.h"
 #include "detect/network_runner.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/detect/small_network.h"
@@ -21,7 +22,7 @@ constexpr TensorShape kStride4{32, 64, 80};
 
 void BM_LoadOnnx(benchmark::State& state) {
   for (auto _ : state) {
-    benchmark::DoNotOptimize(load_network(test::small_onnx_path()).value());
+    benchmark::DoNotOptimize(load_network({test::small_onnx_path()}).value());
   }
 }
 BENCHMARK(BM_LoadOnnx)->Unit(benchmark::kMicrosecond);
@@ -34,7 +35,7 @@ void BM_LoadPosednet(benchmark::State& state) {
     return;
   }
   for (auto _ : state) {
-    benchmark::DoNotOptimize(load_network(path).value());
+    benchmark::DoNotOptimize(load_network({path}).value());
   }
 }
 BENCHMARK(BM_LoadPosednet)->ArgName("format")->DenseRange(0, 2)->Unit(benchmark::kMicrosecond);

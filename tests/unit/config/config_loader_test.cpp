@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -28,6 +29,16 @@ std::string error_of(const std::string& text) {
   }
   EXPECT_EQ(config.error().code, ErrorCode::InvalidConfig);
   return config.error().message;
+}
+
+TEST_F(ConfigLoader, FindsAModelWhateverSizeItIsToLookAt) {
+  const std::string file = folder_.write("person.posednet", "").string();
+  folder_.write("posed.toml", "[detector]\nmodels = [\"person.posednet@64x64\", \"" + file + "\"]");
+  const Result<Config> config = load_config(folder_ / "posed.toml");
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->detector.models, (std::vector<std::string>{file + "@64x64", file}));
+  EXPECT_THAT(error_of("[detector]\nmodels = [\"nothing.posednet@64x64\"]"),
+              StartsWith("posed.toml:2:10: detector.models: [\"nothing.posednet@64x64\"]: nothing.posednet@64x64: "));
 }
 
 TEST_F(ConfigLoader, AnEmptyTextIsTheDefaults) {

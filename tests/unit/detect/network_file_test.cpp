@@ -13,6 +13,7 @@
 
 #include "core/crc32c.h"
 #include "detect/half.h"
+#include "detect/network_loader.h"
 #include "detect/network_passes.h"
 #include "detect/network_runner.h"
 #include "tests/support/temporary_folder.h"
@@ -133,9 +134,9 @@ TEST(NetworkFile, HoldsEveryOperation) {
 TEST(NetworkFile, LoadsEitherKind) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_network(test::small_network(), WeightFormat::Float32, folder / "n"));
-  EXPECT_TRUE(load_network(folder / "n"));
-  EXPECT_TRUE(load_network(test::small_onnx_path()));
-  EXPECT_EQ(load_network(folder / "missing").error().code, ErrorCode::NotFound);
+  EXPECT_TRUE(load_network({folder / "n"}));
+  EXPECT_TRUE(load_network({test::small_onnx_path()}));
+  EXPECT_EQ(load_network({folder / "missing"}).error().code, ErrorCode::NotFound);
   const Result<Network> foreign = read_network(test::small_onnx_path());
   ASSERT_FALSE(foreign);
   EXPECT_THAT(foreign.error().message, HasSubstr("does not begin with 'POSEDNET'"));

@@ -52,6 +52,19 @@ TEST(NetworkRunner, FloatsEqualPyTorch) {
   EXPECT_LT(test::difference(values, expected).largest, kPyTorchTolerance);
 }
 
+TEST(NetworkRunner, RunsAtAnotherSizeOfTheInput) {
+  const Network larger = test::small_network().with_input(192, 128).value();
+  const auto runner = NetworkRunner::create(larger, Precision::Float32).value();
+  EXPECT_EQ(runner->input_shape(), (TensorShape{3, 128, 192}));
+  test::fill_test_input(runner->input());
+  ASSERT_TRUE(runner->run(Deadline{}));
+  EXPECT_EQ(runner->outputs()[1].dimensions, (std::vector<int>{1, 18, 16, 24}));
+  const auto back = NetworkRunner::create(larger.with_input(96, 64).value(), Precision::Float32).value();
+  test::fill_test_input(back->input());
+  ASSERT_TRUE(back->run(Deadline{}));
+  EXPECT_LT(test::difference(test::all_outputs(*back), test::expected_outputs()).largest, kPyTorchTolerance);
+}
+
 TEST(NetworkRunner, EightBitsAreCloseToFloats) {
   const auto runner = small_runner(Precision::Int8);
   ASSERT_TRUE(runner->run({})->finished);

@@ -157,6 +157,30 @@ TEST(Network, RangesMustBeOneForEachTensor) {
   EXPECT_EQ(network.ranges().size(), 2U);
 }
 
+TEST(Network, TakesImagesOfAnotherSize) {
+  const std::vector<Node> nodes{{"head", convolution(2, 12, 2, 2, 0), {0}}};
+  Network network = Network::create("f", kInput, nodes, {1}, {"n", {"person"}, {2}, {{{1, 2}, {3, 4}}}}).value();
+  ASSERT_TRUE(network.set_ranges({{0, 1}, {-1, 1}}));
+  const Network larger = network.with_input(8, 10).value();
+  EXPECT_EQ(larger.input(), (TensorShape{2, 10, 8}));
+  EXPECT_EQ(larger.shapes()[1], (TensorShape{12, 5, 4}));
+  EXPECT_EQ(larger.parameter_count(), network.parameter_count());
+  EXPECT_EQ(larger.metadata().name, "n");
+  ASSERT_EQ(larger.ranges().size(), 2U);
+  EXPECT_EQ(larger.ranges()[1].low, -1);
+}
+
+TEST(Network, NamesASizeThatItCannotTake) {
+  const std::vector<Node> nodes{{"head", convolution(2, 12, 2, 2, 0), {0}}};
+  const Network network = Network::create("f", kInput, nodes, {1}, {"n", {"person"}, {2}, {{{1, 2}, {3, 4}}}}).value();
+  const auto fault = [](const Result<Network>& resized) { return resized ? "none" : resized.error().message; };
+  EXPECT_EQ(fault(network.with_input(8, 9)), "f: an input of 8x9: its sides must be multiples of 2");
+  EXPECT_EQ(fault(network.with_input(0, 8)), "f: an input of 0x8: its sides must be multiples of 2");
+  EXPECT_EQ(network.with_input(8, 9).error().code, ErrorCode::InvalidArgument);
+  EXPECT_EQ(fault(network.with_input(1 << 20, 8)),
+            "f: the input: a tensor of 2x8x1048576 is empty or too large; so it is with an input of 1048576x8");
+}
+
 TEST(Network, CountsParametersAndWork) {
   const Network network = one_node(convolution(2, 5, 3, 2, 1)).value();
   EXPECT_EQ(network.parameter_count(), 5U * 2 * 9 + 5);

@@ -77,6 +77,16 @@ TEST_F(DetectCommand, WritesLinesOfNameScoreAndBox) {
   EXPECT_TRUE(lines.eof());
 }
 
+TEST_F(DetectCommand, LooksAtAnotherSizeOfTheImage) {
+  const Outcome outcome = detect({"--model", kSmallOnnx + "@48x32", "--score", "0.01", "--quiet", image});
+  EXPECT_EQ(outcome.exit_code, kExitOk) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("in 1 images, by small.onnx@48x32 (posed f32)"));
+  std::ofstream(folder / "posed.toml") << "[detector]\nengine = \"opencv\"\nhead = \"boxes\"\nmodels = [\"" << kSmallOnnx << "@48x32\"]\n";
+  const Outcome opencv = detect({"--config", folder / "posed.toml", image});
+  EXPECT_NE(opencv.exit_code, kExitOk);
+  EXPECT_THAT(opencv.err, HasSubstr("small.onnx@48x32: OpenCV takes networks at the size of their file"));
+}
+
 TEST_F(DetectCommand, PrintsATableAndDrawsCopies) {
   const std::string drawn = folder / "drawn";
   const Outcome outcome = detect({"--model", kSmallOnnx, "--score", "0.01", "--draw", drawn, "--quiet", image});

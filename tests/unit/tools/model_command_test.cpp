@@ -85,6 +85,22 @@ TEST(ModelCommand, BenchTimesEveryEngine) {
                                  Not(HasSubstr("small.onnx, posed int8"))));
 }
 
+TEST(ModelCommand, TakesAnotherInputThanTheFiles) {
+  const TemporaryFolder folder;
+  const Outcome info = model({"info", kSmallOnnx + "@192x128"});
+  EXPECT_EQ(info.exit_code, kExitOk) << info.err;
+  EXPECT_THAT(info.out, AllOf(HasSubstr("input: 3x128x192"), HasSubstr("output 1: 18x16x24, stride 8")));
+  ASSERT_EQ(model({"convert", kSmallOnnx + "@48x32", folder / "small.posednet"}).exit_code, kExitOk);
+  EXPECT_THAT(model({"info", folder / "small.posednet"}).out, HasSubstr("input: 3x32x48"));
+  const Outcome bench = model({"bench", kSmallOnnx, kSmallOnnx + "@48x32", "--against-opencv", "--runs", "1"});
+  EXPECT_EQ(bench.exit_code, kExitOk) << bench.err;
+  EXPECT_THAT(bench.out, AllOf(HasSubstr("small.onnx, OpenCV DNN"), HasSubstr("small.onnx@48x32, posed f32"),
+                               Not(HasSubstr("small.onnx@48x32, OpenCV"))));
+  const Outcome odd = model({"info", kSmallOnnx + "@50x32"});
+  EXPECT_EQ(odd.exit_code, kExitUsage);
+  EXPECT_THAT(odd.err, HasSubstr("small.onnx: an input of 50x32: its sides must be multiples of 8"));
+}
+
 TEST(ModelCommand, BenchOfEightBitsNeedsCalibration) {
   const Outcome outcome = model({"bench", kSmallOnnx, "--precision", "int8", "--runs", "1"});
   EXPECT_EQ(outcome.exit_code, kExitUnavailable);
