@@ -52,6 +52,10 @@ PRESETS = {
 }
 
 
+class DivergedError(Exception):
+    """The loss is no finite number any more; the last checkpoint is from before."""
+
+
 class MovingAverage:
     """Exponential moving average of all weights and statistics (EMA); it is what is evaluated and shipped."""
 
@@ -244,7 +248,9 @@ class Training:
         self.optimizer.zero_grad(set_to_none=True)
         total.backward()
         self.seconds = self.team.average(self.network.parameters(), self.before + time.monotonic() - self.begun)
-        nn.utils.clip_grad_norm_(self.network.parameters(), 10.0)
+        # Of the mean of the team's gradients, so that all of a team give up at the same step.
+        if not torch.isfinite(nn.utils.clip_grad_norm_(self.network.parameters(), 10.0)):
+            raise DivergedError(f"step {self.step}: the gradients are no finite numbers (loss {float(total):g}); {self.checkpoint_path} is from before")
         self.optimizer.step()
         self.ema.update(self.network, self.step)
         self.step += 1
@@ -345,7 +351,7 @@ def main() -> int:
         training = Training(args)
         training.team = fork_team(args.processes)
         training.run()
-    except DataError as error:
+    except (DataError, DivergedError) as error:
         print(f"train.py: {error}")
         return 65
     return 0
