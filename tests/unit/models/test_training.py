@@ -17,7 +17,7 @@ from dataset import DataError
 from engines import CheckpointDetector, OnnxDetector
 from export import export
 from network import NetworkOptions, Yolo
-from train import PRESETS, Settings, Training, parse_arguments, rate_at
+from train import PRESETS, DivergedError, Settings, Training, parse_arguments, rate_at
 
 
 def write_images(folder: Path, count: int = 6) -> None:
@@ -77,6 +77,16 @@ class Resuming(WithImages):
         training = self.training("timed", "--time-budget-min", "0.0001")
         self.run_silently(training)
         self.assertEqual((training.step, training.progress()), (1, 1.0))
+
+    def test_a_run_that_diverges_stops_and_leaves_its_last_checkpoint(self):
+        self.run_silently(self.training("parts"), last_step=1)
+        training = self.training("parts")
+        with torch.no_grad():
+            next(training.network.parameters()).fill_(torch.nan)
+        with self.assertRaisesRegex(DivergedError, "step 1: .*checkpoint.pt is from before"):
+            self.run_silently(training)
+        weights = read_checkpoint(self.path / "parts" / "checkpoint.pt")["network"]
+        self.assertTrue(all(torch.isfinite(value).all() for value in weights.values()))
 
     def test_a_missing_folder_is_an_error_of_the_data(self):
         with self.assertRaisesRegex(DataError, "no such folder"):
