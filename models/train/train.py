@@ -199,12 +199,14 @@ class Training:
         self.compositor = self.read_compositor() if args.cut_outs else None
         self.device = torch.device(args.device)
         self.network = Yolo(options)
-        self.anchors = np.array(saved["anchors"]) if saved else fitted_anchors(self.samples, self.settings, len(options.strides), args.seed)
         if saved:
             self.network.load_state_dict(saved["network"])
+            self.anchors = np.array(saved["anchors"])
         elif args.start_from:
             weights, self.anchors = weights_to_start_from(args.start_from, options)
             self.network.load_state_dict(weights)
+        else:
+            self.anchors = fitted_anchors(self.samples, self.settings, len(options.strides), args.seed)
         self.network.to(self.device, memory_format=torch.channels_last)
         self.ema = MovingAverage(self.network, self.settings.ema_half_life_steps)
         self.optimizer = make_optimizer(self.network, self.settings)

@@ -165,7 +165,8 @@ void add_bench(CLI::App& parent, const Console& console, int& exit_code) {
   command->add_option("--precision", options->precision, "f32, int8, or all: f32, and int8 of calibrated networks")
       ->check(CLI::IsMember({"f32", "int8", "all"}))
       ->capture_default_str();
-  command->add_flag("--against-opencv", options->request.against_opencv, "Also time OpenCV's DNN module on the ONNX files named without a size");
+  command->add_flag("--against-opencv", options->request.against_opencv,
+                    "Also time OpenCV's DNN module on the ONNX files named without a size");
   command->add_option("--runs", options->request.runs, "How many runs of each")->check(CLI::PositiveNumber)->capture_default_str();
   command->add_flag("--steps", options->request.steps, "Also print what each step took");
   command->callback([options, &console, &exit_code] { exit_code = run_bench(*options, console); });

@@ -81,7 +81,8 @@ TEST_F(DetectCommand, LooksAtAnotherSizeOfTheImage) {
   const Outcome outcome = detect({"--model", kSmallOnnx + "@48x32", "--score", "0.01", "--quiet", image});
   EXPECT_EQ(outcome.exit_code, kExitOk) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("in 1 images, by small.onnx@48x32 (posed f32)"));
-  std::ofstream(folder / "posed.toml") << "[detector]\nengine = \"opencv\"\nhead = \"boxes\"\nmodels = [\"" << kSmallOnnx << "@48x32\"]\n";
+  std::ofstream(folder / "posed.toml") << "[detector]\nengine = \"opencv\"\nhead = \"boxes\"\nmodels = [\"" << kSmallOnnx
+                                       << "@48x32\"]\n";
   const Outcome opencv = detect({"--config", folder / "posed.toml", image});
   EXPECT_NE(opencv.exit_code, kExitOk);
   EXPECT_THAT(opencv.err, HasSubstr("small.onnx@48x32: OpenCV takes networks at the size of their file"));
