@@ -25,18 +25,16 @@ std::optional<int> parse_side(std::string_view digits) {
 
 ModelName parse_model_name(std::string_view text) {
   const std::size_t at = text.rfind('@');
-  if (at != std::string_view::npos && at > 0) {
-    const std::string_view size = text.substr(at + 1);
-    const std::size_t times = size.find('x');
-    if (times != std::string_view::npos) {
-      const std::optional<int> width = parse_side(size.substr(0, times));
-      const std::optional<int> height = parse_side(size.substr(times + 1));
-      if (width && height) {
-        return {std::string(text.substr(0, at)), *width, *height};
-      }
-    }
+  const std::size_t times = text.rfind('x');
+  if (at == std::string_view::npos || at == 0 || times == std::string_view::npos || times < at) {
+    return {std::string(text), 0, 0};
   }
-  return {std::string(text), 0, 0};
+  const std::optional<int> width = parse_side(text.substr(at + 1, times - at - 1));
+  const std::optional<int> height = parse_side(text.substr(times + 1));
+  if (!width || !height) {
+    return {std::string(text), 0, 0};
+  }
+  return {std::string(text.substr(0, at)), *width, *height};
 }
 
 std::string to_string(const ModelName& name) {

@@ -1,6 +1,7 @@
 #include "detect/network_loader.h"
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/file_io.h"
@@ -9,13 +10,24 @@
 
 namespace posed {
 
-Result<Network> load_network(const ModelName& name) {
-  std::vector<std::uint8_t> bytes;
-  if (const Status read = read_file(name.file, bytes); !read) {
-    return tl::unexpected<Error>(read.error());
+Result<Network> NetworkLoader::load(const ModelName& name) {
+  if (!network_ || file_ != name.file) {
+    std::vector<std::uint8_t> bytes;
+    if (const Status read = read_file(name.file, bytes); !read) {
+      return tl::unexpected<Error>(read.error());
+    }
+    Result<Network> network = is_network_file(bytes) ? parse_network(bytes, name.file) : parse_onnx(bytes, name.file);
+    if (!network) {
+      return network;
+    }
+    network_ = std::move(*network);
+    file_ = name.file;
   }
-  Result<Network> network = is_network_file(bytes) ? parse_network(bytes, name.file) : parse_onnx(bytes, name.file);
-  return network && name.has_size() ? network->with_input(name.width, name.height) : network;
+  return name.has_size() ? network_->with_input(name.width, name.height) : *network_;
+}
+
+Result<Network> load_network(const ModelName& name) {
+  return NetworkLoader().load(name);
 }
 
 }  // namespace posed

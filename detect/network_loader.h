@@ -1,6 +1,7 @@
 #pragma once
 
-#include <filesystem>
+#include <optional>
+#include <string>
 
 #include "config/model_name.h"
 #include "core/result.h"
@@ -8,8 +9,19 @@
 
 namespace posed {
 
-/// Reads a network file of either kind, by what it begins with, for images of the size that the name asks for. Errors as in
-/// `read_network` (detect/network_file.h), `read_onnx` (detect/onnx_reader.h) and `Network::with_input`. Reentrant.
+/// Reads network files of either kind, by what they begin with, for images of the sizes that the names ask for. Keeps the file that
+/// it read last, since the rungs of a ladder are mostly one network at several sizes. Thread-bound.
+class NetworkLoader {
+ public:
+  /// Errors as in `read_network` (detect/network_file.h), `read_onnx` (detect/onnx_reader.h) and `Network::with_input`.
+  Result<Network> load(const ModelName& name);
+
+ private:
+  std::string file_;
+  std::optional<Network> network_;  ///< as the file says
+};
+
+/// For one network. Errors as in `NetworkLoader`. Reentrant.
 Result<Network> load_network(const ModelName& name);
 
 }  // namespace posed

@@ -142,6 +142,23 @@ TEST(NetworkFile, LoadsEitherKind) {
   EXPECT_THAT(foreign.error().message, HasSubstr("does not begin with 'POSEDNET'"));
 }
 
+TEST(NetworkLoader, ReadsAFileOnceForAllSizes) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "n";
+  const Network written = test::small_network();
+  ASSERT_TRUE(write_network(written, WeightFormat::Float32, file));
+  NetworkLoader networks;
+  const ModelName as_written{file};
+  const ModelName larger{file, 2 * written.input().width, written.input().height};
+  ASSERT_TRUE(networks.load(larger));
+  std::filesystem::remove(file);
+  EXPECT_EQ(networks.load(as_written).value().input(), written.input());
+  EXPECT_EQ(networks.load(larger).value().input().width, larger.width);
+
+  EXPECT_TRUE(networks.load({test::small_onnx_path()}));
+  EXPECT_EQ(networks.load(as_written).error().code, ErrorCode::NotFound) << "only the file read last is kept";
+}
+
 TEST(NetworkFile, NoticesEveryTruncation) {
   const std::vector<std::uint8_t> bytes = small_file();
   for (std::size_t length = 0; length < bytes.size(); length += length < 100 ? 1 : 97) {
