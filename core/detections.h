@@ -53,6 +53,13 @@ struct Detections {
 
   std::span<const Detection> found() const { return {people.data(), count}; }
 
+  /// Keeps those of at least that confidence.
+  void drop_below(float score) {
+    const auto end = people.begin() + count;
+    count = static_cast<std::uint32_t>(std::find_if(people.begin(), end, [&](const Detection& d) { return d.score < score; }) -
+                                       people.begin());
+  }
+
   /// Keeps what there is room for.
   void assign(std::span<const Detection> most_confident_first) {
     count = static_cast<std::uint32_t>(std::min(most_confident_first.size(), kCapacity));

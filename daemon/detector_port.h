@@ -22,7 +22,7 @@ class FrameDetector {
   /// Within the budget.
   virtual Result<DetectionOutcome> detect(const RgbdFrame& frame, Detections& found) = 0;
 
-  /// As long as it takes, with the model of the configuration: a function of the image alone.
+  /// As long as it takes, with the model of the configuration: a function of the images so far alone.
   virtual Result<DetectionOutcome> detect_unhurried(const RgbdFrame& frame, Detections& found) = 0;
 
   virtual std::string model_name(std::size_t model) const = 0;

@@ -18,6 +18,14 @@ namespace {
 constexpr int kWarmUpRuns = 2;  // first touch of the weights
 constexpr int kTimedRuns = 5;
 
+bool has_memory(const DetectorConfig& config) { return config.memory_s > 0; }
+
+/// A memory wants to know of boxes too unsure to be reported.
+DetectorConfig before_memory(DetectorConfig config) {
+  config.score = has_memory(config) ? std::min<double>(config.score, PersonMemory::kUnsureScore) : config.score;
+  return config;
+}
+
 DetectionThresholds thresholds(const DetectorConfig& config) {
   return {static_cast<float>(config.score), static_cast<float>(config.iou)};
 }
@@ -39,8 +47,8 @@ constexpr bool kEightBitsAreFast = true;
 constexpr bool kEightBitsAreFast = false;
 #endif
 
-Result<std::unique_ptr<ObjectDetector>> load_own(const DetectorConfig& config, const ModelName& name) {
-  Result<Network> network = load_network(name);
+Result<std::unique_ptr<ObjectDetector>> load_own(const DetectorConfig& config, const ModelName& name, NetworkLoader& networks) {
+  Result<Network> network = networks.load(name);
   if (!network) {
     return tl::unexpected<Error>(network.error());
   }
@@ -63,6 +71,10 @@ Result<std::unique_ptr<ObjectDetector>> load_opencv(const DetectorConfig& config
     return tl::unexpected<Error>(engine.error());
   }
   return ObjectDetector::create(std::move(*engine), {}, head_kind(config.head), config.person_class, thresholds(config));
+}
+
+Result<std::unique_ptr<ObjectDetector>> load(const DetectorConfig& config, const ModelName& name, NetworkLoader& networks) {
+  return config.engine == DetectorEngine::Posed ? load_own(config, name, networks) : load_opencv(config, name);
 }
 
 /// Median of a few runs, the deadline far away.
@@ -89,7 +101,8 @@ Error blame_config(const Error& error) {
 }  // namespace
 
 Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const ModelName& name) {
-  return config.engine == DetectorEngine::Posed ? load_own(config, name) : load_opencv(config, name);
+  NetworkLoader networks;
+  return load(config, name, networks);
 }
 
 Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorConfig& config, int image_width, int image_height,
@@ -101,9 +114,10 @@ Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorCon
   };
   std::vector<std::uint8_t> grey(static_cast<std::size_t>(image_width) * static_cast<std::size_t>(image_height) * 3, 128);
   const ImageView<const std::uint8_t> bgr{grey.data(), image_width, image_height, std::ptrdiff_t{3} * image_width, 3};
+  NetworkLoader networks;
   std::vector<Loaded> loaded;
   for (const std::string& file : config.models) {
-    Result<std::unique_ptr<ObjectDetector>> model = load_object_detector(config, parse_model_name(file));
+    Result<std::unique_ptr<ObjectDetector>> model = load(before_memory(config), parse_model_name(file), networks);
     if (!model) {
       return tl::unexpected<Error>(blame_config(model.error()));
     }
@@ -126,17 +140,22 @@ Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorCon
     unloaded_ns.push_back(std::max(l.unloaded_ns, unloaded_ns.empty() ? TimeNs{0} : unloaded_ns.back()));
   }
   return std::unique_ptr<PersonDetector>(
-      new PersonDetector(from_seconds(config.budget_s), clock, std::move(models), std::move(names), std::move(unloaded_ns)));
+      new PersonDetector(config, clock, std::move(models), std::move(names), std::move(unloaded_ns)));
 }
 
-PersonDetector::PersonDetector(TimeNs budget_ns, const Clock& clock, std::vector<std::unique_ptr<ObjectDetector>> models,
+PersonDetector::PersonDetector(const DetectorConfig& config, const Clock& clock, std::vector<std::unique_ptr<ObjectDetector>> models,
                                std::vector<std::string> names, std::vector<TimeNs> unloaded_ns)
-    : budget_ns_(budget_ns),
+    : budget_ns_(from_seconds(config.budget_s)),
+      least_score_(static_cast<float>(config.score)),
       clock_(clock),
       models_(std::move(models)),
       names_(std::move(names)),
       unloaded_ns_(std::move(unloaded_ns)),
-      ladder_(unloaded_ns_, budget_ns) {}
+      ladder_(unloaded_ns_, budget_ns_) {
+  if (has_memory(config)) {
+    memory_.emplace(from_seconds(config.memory_s));
+  }
+}
 
 Result<DetectionOutcome> PersonDetector::detect(const RgbdFrame& frame, Detections& found) {
   const std::size_t model = ladder_.rung();
@@ -169,6 +188,10 @@ Result<DetectionOutcome> PersonDetector::run(const RgbdFrame& frame, std::size_t
   found.image_height = frame.bgr.height;
   found.detect_ns = outcome->elapsed_ns;
   found.model = static_cast<std::uint32_t>(model);
+  if (outcome->finished && memory_) {
+    memory_->judge(found);
+    found.drop_below(least_score_);
+  }
   return DetectionOutcome{outcome->finished, model, outcome->elapsed_ns, 0, outcome->longest_step_ns};
 }
 

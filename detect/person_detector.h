@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "core/result.h"
 #include "core/rgbd_frame.h"
 #include "detect/object_detector.h"
+#include "detect/person_memory.h"
 #include "detect/rung_ladder.h"
 
 namespace posed {
@@ -27,7 +29,8 @@ struct DetectionOutcome {
 };
 
 /// Finds people within a time budget: of the configured models it takes the largest that fits, and gives a frame up when the
-/// budget is spent. Thread-bound; everything is allocated by `create`.
+/// budget is spent. What a model says of a frame is judged by what was seen in those before (detect/person_memory.h), unless the
+/// configuration gives no memory. Thread-bound; everything is allocated by `create`.
 class PersonDetector {
  public:
   /// Loads the models and measures each on this machine, a few runs of a blank image of the given size. Errors: InvalidConfig,
@@ -38,7 +41,7 @@ class PersonDetector {
   /// In real time. Error: Unavailable, where an engine's library fails.
   Result<DetectionOutcome> detect(const RgbdFrame& frame, Detections& found);
 
-  /// With a model of the caller's choice and as long as it takes, so that the outcome is a function of the image alone.
+  /// With a model of the caller's choice and as long as it takes, so that the outcome is a function of the images so far alone.
   Result<DetectionOutcome> detect_unhurried(const RgbdFrame& frame, std::size_t model, Detections& found);
 
   std::size_t model_count() const { return models_.size(); }
@@ -48,11 +51,13 @@ class PersonDetector {
   TimeNs unloaded_ns(std::size_t model) const { return unloaded_ns_[model]; }
 
  private:
-  PersonDetector(TimeNs budget_ns, const Clock& clock, std::vector<std::unique_ptr<ObjectDetector>> models,
+  PersonDetector(const DetectorConfig& config, const Clock& clock, std::vector<std::unique_ptr<ObjectDetector>> models,
                  std::vector<std::string> names, std::vector<TimeNs> unloaded_ns);
   Result<DetectionOutcome> run(const RgbdFrame& frame, std::size_t model, const Deadline& deadline, Detections& found);
 
   TimeNs budget_ns_;
+  float least_score_;
+  std::optional<PersonMemory> memory_;
   const Clock& clock_;
   std::vector<std::unique_ptr<ObjectDetector>> models_;
   std::vector<std::string> names_;

@@ -1,0 +1,151 @@
+#include "detect/person_memory.h"
+
+#include <cmath>
+#include <initializer_list>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace posed {
+namespace {
+
+constexpr TimeNs kFrame = 33 * kNsPerMs;
+constexpr float kRise = 4.48169F;  // of the odds, for somebody who is surely seen: e^1.5
+
+BoundingBox person_at(float x, float width = 100) { return {x, 100, x + width, 400}; }
+
+/// Frames of 640x480, one after the other.
+class Stream {
+ public:
+  explicit Stream(TimeNs memory_ns = kNsPerSecond) : memory_(memory_ns) {}
+
+  std::vector<Detection> next(std::initializer_list<Detection> most_confident_first, TimeNs after_ns = kFrame) {
+    Detections found;
+    found.stamp_utc_ns = stamp_ns_ += after_ns;
+    found.image_width = 640;
+    found.image_height = 480;
+    found.assign(most_confident_first);
+    memory_.judge(found);
+    return {found.found().begin(), found.found().end()};
+  }
+
+ private:
+  PersonMemory memory_;
+  TimeNs stamp_ns_ = 1'700'000'000 * kNsPerSecond;
+};
+
+float odds(float score) { return score / (1 - score); }
+
+TEST(PersonMemory, BelievesWhoWasSurelySeenMore) {
+  Stream stream;
+  EXPECT_EQ(stream.next({{person_at(100), 0.8F}}), std::vector<Detection>({{person_at(100), 0.8F}})) << "nobody is known yet";
+  EXPECT_NEAR(odds(stream.next({{person_at(104), 0.8F}})[0].score), kRise * odds(0.8F), 0.02F);
+
+  const Detection unsure = stream.next({{person_at(108), 0.2F}})[0];
+  EXPECT_EQ(unsure.box, person_at(108)) << "no box is moved";
+  EXPECT_GT(odds(unsure.score), 4 * odds(0.2F));
+  EXPECT_LT(odds(unsure.score), kRise * odds(0.2F));
+}
+
+TEST(PersonMemory, BelievesTheLessTheLongerAgoThatWas) {
+  Stream stream;
+  stream.next({{person_at(100), 0.8F}});
+  float score = 1;
+  for (int frame = 0; frame < 60; ++frame) {
+    const float before = score;
+    score = stream.next({{person_at(100), 0.2F}})[0].score;
+    EXPECT_LT(score, before);
+    EXPECT_GT(score, 0.2F);
+  }
+  EXPECT_NEAR(odds(score), std::exp(1.5F * std::exp(-60 * 0.033F)) * odds(0.2F), 0.01F);
+}
+
+TEST(PersonMemory, LeavesWhoWasNeverSurelySeen) {
+  Stream stream;
+  stream.next({{person_at(100), 0.45F}});
+  EXPECT_EQ(stream.next({{person_at(100), 0.45F}})[0].score, 0.45F);
+}
+
+TEST(PersonMemory, GivesAPersonToOneBox) {
+  Stream stream;
+  stream.next({{person_at(100), 0.9F}});
+  const std::vector<Detection> found = stream.next({{person_at(110), 0.8F}, {person_at(100), 0.3F}, {person_at(125), 0.2F}});
+  EXPECT_GT(found[0].score, 0.9F) << "a sure box before an unsure one, even where that overlaps more";
+  EXPECT_EQ(found[1].score, 0.3F);
+  EXPECT_EQ(found[2].score, 0.2F);
+}
+
+TEST(PersonMemory, KeepsTwoApartWhoPass) {
+  Stream stream;
+  for (float x = 0; x < 90; x += 10) {
+    stream.next({{person_at(100 + x), 0.9F}, {person_at(330 - x), 0.9F}});
+  }
+  // One goes behind the other: each is taken for who goes on as before.
+  const std::vector<Detection> found = stream.next({{person_at(190), 0.9F}, {person_at(240), 0.2F}, {person_at(215), 0.1F}});
+  EXPECT_EQ(found[1].box, person_at(240));
+  EXPECT_GT(odds(found[1].score), 4 * odds(0.2F));
+  EXPECT_EQ(found[2].score, 0.1F) << "nobody is left who it could be";
+}
+
+TEST(PersonMemory, FollowsWhoGoesFast) {
+  Stream stream;
+  float x = 20;
+  for (int frame = 0; frame < 12; ++frame, x += 20) {
+    stream.next({{person_at(x), 0.9F}});
+  }
+  // Unseen for two frames, 60 pixels on: too far from the last box (overlap 0.25), not from where they should be.
+  stream.next({});
+  stream.next({});
+  EXPECT_GT(stream.next({{person_at(x + 40), 0.2F}})[0].score, 0.4F);
+}
+
+TEST(PersonMemory, OrdersBoxesAnew) {
+  Stream stream;
+  stream.next({{person_at(300), 0.9F}});
+  const std::vector<Detection> found = stream.next({{person_at(100), 0.4F}, {person_at(300), 0.3F}});
+  EXPECT_EQ(found[0].box, person_at(300));
+  EXPECT_EQ(found[1].box, person_at(100));
+}
+
+TEST(PersonMemory, ForgetsWhoIsNotSeen) {
+  Stream stream;
+  stream.next({{person_at(100), 0.9F}});
+  for (int frame = 0; frame < 6; ++frame) {
+    stream.next({});
+  }
+  EXPECT_EQ(stream.next({{person_at(100), 0.3F}})[0].score, 0.3F);
+}
+
+TEST(PersonMemory, ForgetsEverybodyAcrossAGapAndWhenTimeGoesBack) {
+  for (const TimeNs after_ns : {kNsPerSecond, TimeNs{0}, -kFrame}) {
+    Stream stream;
+    stream.next({{person_at(100), 0.9F}});
+    EXPECT_EQ(stream.next({{person_at(100), 0.3F}}, after_ns)[0].score, 0.3F);
+  }
+}
+
+TEST(PersonMemory, HoldsNoMoreThanAFrameCan) {
+  Stream stream;
+  for (int frame = 0; frame < 4; ++frame) {
+    Detections crowd;
+    for (std::size_t i = 0; i < Detections::kCapacity; ++i) {
+      crowd.people[i] = {{static_cast<float>(i * 9 + frame * 4), 0, static_cast<float>(i * 9 + frame * 4 + 5), 9}, 0.9F};
+    }
+    for (const Detection& d : crowd.people) {
+      const float score = stream.next({d}, frame == 0 ? kFrame : 1)[0].score;
+      EXPECT_TRUE(score >= 0.9F && score <= 1.0F) << score;
+    }
+  }
+}
+
+TEST(PersonMemory, KeepsScoresFromZeroToOne) {
+  Stream stream;
+  stream.next({{person_at(100), 1.0F}});
+  const float sure = stream.next({{person_at(100), 1.0F}})[0].score;
+  EXPECT_GT(sure, 0.99F);
+  EXPECT_LE(sure, 1.0F);
+}
+
+}  // namespace
+}  // namespace posed
