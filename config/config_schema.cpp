@@ -122,8 +122,8 @@ void add_detector(SchemaBuilder& schema, DetectorConfig& c) {
            "Which of `models`, counted from 0, looks in `lockstep`, where no clock may decide. The last one where there are fewer.")
       .key("score", real(c.score, 0.01, 0.99), "", "Boxes of less confidence are not reported.")
       .key("memory_s", real(c.memory_s, 0.0, 60.0), "s",
-           "A box that continues somebody who was surely seen before is more likely right, so its confidence rises, by less the longer "
-           "ago that was; by half as much after about 0.7 of this time. 0: each image is judged by itself.")
+           "A box that continues somebody who was surely seen before is more likely right, so its confidence rises, by less the "
+           "longer ago that was; by half as much after about 0.7 of this time. 0: each image is judged by itself.")
       .key("iou", real(c.iou, 0.05, 0.95), "",
            "Of two boxes that overlap by more (intersection over union), the less confident one goes.")
       .key("engine", choice(c.engine, {{"posed", DetectorEngine::Posed}, {"opencv", DetectorEngine::OpenCv}}), "",

@@ -18,7 +18,9 @@ namespace {
 constexpr int kWarmUpRuns = 2;  // first touch of the weights
 constexpr int kTimedRuns = 5;
 
-bool has_memory(const DetectorConfig& config) { return config.memory_s > 0; }
+bool has_memory(const DetectorConfig& config) {
+  return config.memory_s > 0;
+}
 
 /// A memory wants to know of boxes too unsure to be reported.
 DetectorConfig before_memory(DetectorConfig config) {
@@ -143,8 +145,9 @@ Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorCon
       new PersonDetector(config, clock, std::move(models), std::move(names), std::move(unloaded_ns)));
 }
 
-PersonDetector::PersonDetector(const DetectorConfig& config, const Clock& clock, std::vector<std::unique_ptr<ObjectDetector>> models,
-                               std::vector<std::string> names, std::vector<TimeNs> unloaded_ns)
+PersonDetector::PersonDetector(const DetectorConfig& config, const Clock& clock,
+                               std::vector<std::unique_ptr<ObjectDetector>> models, std::vector<std::string> names,
+                               std::vector<TimeNs> unloaded_ns)
     : budget_ns_(from_seconds(config.budget_s)),
       least_score_(static_cast<float>(config.score)),
       clock_(clock),

@@ -19,9 +19,13 @@ constexpr TimeNs kUnseenNs = 170'000'000;  // after which somebody is forgotten:
 constexpr TimeNs kGapNs = 500'000'000;     // between two frames, after which everybody is
 constexpr float kLeastDoubt = 1e-4F;       // scores are kept so far from 0 and 1
 
-Eigen::Array4f sides_of(const BoundingBox& box) { return {box.x_min, box.y_min, box.x_max, box.y_max}; }
+Eigen::Array4f sides_of(const BoundingBox& box) {
+  return {box.x_min, box.y_min, box.x_max, box.y_max};
+}
 
-BoundingBox box_of(const Eigen::Array4f& sides) { return {sides[0], sides[1], sides[2], sides[3]}; }
+BoundingBox box_of(const Eigen::Array4f& sides) {
+  return {sides[0], sides[1], sides[2], sides[3]};
+}
 
 float with_odds_raised(float score, float rise) {
   const float doubtful = std::clamp(score, kLeastDoubt, 1 - kLeastDoubt);

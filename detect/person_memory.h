@@ -26,8 +26,8 @@ class PersonMemory {
   /// `memory_ns`, above 0: in which the rise of the odds' logarithm fades to 1/e.
   explicit PersonMemory(TimeNs memory_ns);
 
-  /// Judges the boxes of one frame, of which those from `kUnsureScore` on are wanted, and orders them anew. Frames come in the order
-  /// of their stamps; one that does not, or comes late, finds nobody remembered.
+  /// Judges the boxes of one frame, of which those from `kUnsureScore` on are wanted, and orders them anew. Frames come in the
+  /// order of their stamps; one that does not, or comes late, finds nobody remembered.
   void judge(Detections& found);
 
  private:

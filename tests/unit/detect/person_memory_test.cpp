@@ -13,7 +13,9 @@ namespace {
 constexpr TimeNs kFrame = 33 * kNsPerMs;
 constexpr float kRise = 4.48169F;  // of the odds, for somebody who is surely seen: e^1.5
 
-BoundingBox person_at(float x, float width = 100) { return {x, 100, x + width, 400}; }
+BoundingBox person_at(float x, float width = 100) {
+  return {x, 100, x + width, 400};
+}
 
 /// Frames of 640x480, one after the other.
 class Stream {
@@ -35,7 +37,9 @@ class Stream {
   TimeNs stamp_ns_ = 1'700'000'000 * kNsPerSecond;
 };
 
-float odds(float score) { return score / (1 - score); }
+float odds(float score) {
+  return score / (1 - score);
+}
 
 TEST(PersonMemory, BelievesWhoWasSurelySeenMore) {
   Stream stream;
