@@ -116,10 +116,11 @@ Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorCon
   };
   std::vector<std::uint8_t> grey(static_cast<std::size_t>(image_width) * static_cast<std::size_t>(image_height) * 3, 128);
   const ImageView<const std::uint8_t> bgr{grey.data(), image_width, image_height, std::ptrdiff_t{3} * image_width, 3};
+  const DetectorConfig before = before_memory(config);
   NetworkLoader networks;
   std::vector<Loaded> loaded;
   for (const std::string& file : config.models) {
-    Result<std::unique_ptr<ObjectDetector>> model = load(before_memory(config), parse_model_name(file), networks);
+    Result<std::unique_ptr<ObjectDetector>> model = load(before, parse_model_name(file), networks);
     if (!model) {
       return tl::unexpected<Error>(blame_config(model.error()));
     }
