@@ -7,7 +7,7 @@ screen. The label is what can be seen of them.
 """
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
@@ -246,14 +246,19 @@ def clutter(image: np.ndarray, others: list[np.ndarray], rng: np.random.Generato
 
 @dataclass
 class Compositor:
-    """Makes samples of people and backgrounds, a new one each time."""
+    """Makes samples of people and backgrounds, a new one each time, or gives one of the hard ones, which were made so before and which a
+    detector got wrong (mine_composites.py)."""
 
     people: list[CutOut]
     backgrounds: list[Sample]
     width: int = 400
     height: int = 300
+    hard: list[Sample] = field(default_factory=list)
+    hard_share: float = 0.4  # of the samples, where there are hard ones
 
     def sample(self, rng: np.random.Generator) -> Sample:
+        if self.hard and rng.random() < self.hard_share:
+            return self.hard[rng.integers(len(self.hard))]
         background = background_of(self.backgrounds[rng.integers(len(self.backgrounds))], self.width, self.height, rng)
         if rng.random() < 0.4:
             background = clutter(background, [self.backgrounds[i].image for i in rng.integers(len(self.backgrounds), size=8)], rng)

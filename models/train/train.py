@@ -228,7 +228,8 @@ class Training:
         if not people or not backgrounds:
             raise DataError(f"composites need somebody who is cut out ({len(people)}) and images that show nobody ({len(backgrounds)})")
         print(f"composites of {len(people)} people and {len(backgrounds)} backgrounds", flush=True)
-        return Compositor(people, backgrounds)
+        hard = [s for folder in self.args.hard_composites for s in read_folder(folder, 1, self.args.longest_side)]
+        return Compositor(people, backgrounds, hard=hard)
 
     def state(self) -> dict:
         return {"settings": vars(self.settings), "options": self.network.options.to_dict(), "anchors": self.anchors.tolist(),
@@ -314,6 +315,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--data", type=Path, nargs="+", required=True, help="folders of images and labels")
     parser.add_argument("--cut-outs", type=Path, nargs="+", default=[],
                         help="folders of people cut out (NAME.jpg, NAME_mask.png), for composites with the images of --data that show nobody")
+    parser.add_argument("--hard-composites", type=Path, nargs="+", default=[],
+                        help="folders of composites that a detector got wrong (mine_composites.py), for a part of the composites")
     parser.add_argument("--valid", type=Path, help="folder to measure on; never trained on")
     parser.add_argument("--valid-size", type=int, nargs=2, default=(320, 320), metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--out", type=Path, required=True, help="folder of checkpoint.pt and log.csv; a run found there goes on")

@@ -200,6 +200,13 @@ class Compositors(unittest.TestCase):
         again = compositor.sample(np.random.default_rng(59))
         np.testing.assert_array_equal(again.image, sample.image)
 
+    def test_some_samples_are_hard_ones(self):
+        person = CutOut(np.full((200, 80, 3), 255, np.uint8), np.ones((200, 80), np.float32), True)
+        room = Sample(Path("room"), np.zeros((90, 200, 3), np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
+        compositor = Compositor([person], [room], 160, 120, hard=[replace(room, path=Path("hard"))], hard_share=0.5)
+        hard = sum(compositor.sample(np.random.default_rng(seed)).path == Path("hard") for seed in range(100))
+        self.assertTrue(30 < hard < 70, hard)
+
     def test_stay_whole_and_keep_people_whom_a_side_of_the_image_cuts(self):
         image = np.zeros((240, 320, 3), np.uint8)
         image[40:, :80] = 200
