@@ -270,3 +270,10 @@ class Compositor:
             people[1] = people[0]
         image, boxes = composite(background, list(zip(people, near)), rng)
         return Sample(Path("composite"), image, np.zeros(len(boxes), np.int64), boxes.astype(np.float32))
+
+    def clutter_alone(self, rng: np.random.Generator) -> Sample:
+        """Nobody: a background with one or two lots of clutter."""
+        image = background_of(self.backgrounds[rng.integers(len(self.backgrounds))], self.width, self.height, rng)
+        for _ in range(rng.integers(1, 3)):
+            image = clutter(image, [self.backgrounds[i].image for i in rng.integers(len(self.backgrounds), size=8)], rng)
+        return Sample(Path("composite"), image, np.zeros(0, np.int64), np.zeros((0, 4), np.float32))

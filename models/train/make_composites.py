@@ -29,6 +29,7 @@ def main() -> int:
     parser.add_argument("--images", type=int, default=1000)
     parser.add_argument("--size", type=int, nargs=2, default=(480, 360), metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--least-height", type=float, default=220, help="of a person worth cutting out of a labelled image [pixels]")
+    parser.add_argument("--nobody", action="store_true", help="clutter alone, where a detector should find nobody; needs no people")
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
     cv2.setNumThreads(1)
@@ -41,14 +42,14 @@ def main() -> int:
         return 65
     people += [c for s in samples for i in range(len(s.boxes)) if (c := cut_out(s, i, args.least_height)) is not None]
     print(f"{len(people)} people, {len(backgrounds)} backgrounds", flush=True)
-    if not people or not backgrounds:
+    if not (people or args.nobody) or not backgrounds:
         print("make_composites.py: nobody could be cut out, or no image shows nobody")
         return 65
     args.out.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(args.seed)
     compositor = Compositor(people, backgrounds, *args.size)
     for i in range(args.images):
-        write(args.out, f"{i:05d}", compositor.sample(rng))
+        write(args.out, f"{i:05d}", compositor.clutter_alone(rng) if args.nobody else compositor.sample(rng))
     return 0
 
 

@@ -200,6 +200,15 @@ class Compositors(unittest.TestCase):
         again = compositor.sample(np.random.default_rng(59))
         np.testing.assert_array_equal(again.image, sample.image)
 
+    def test_clutter_alone_shows_nobody_and_no_room_as_it_was(self):
+        rooms = [Sample(Path("room"), np.full((90, 200, 3), grey, np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32)) for grey in (0, 80, 160, 240)]
+        compositor = Compositor([], rooms, 160, 120)
+        for seed in range(5):
+            sample = compositor.clutter_alone(np.random.default_rng(seed))
+            self.assertEqual(sample.image.shape, (120, 160, 3))
+            self.assertEqual((len(sample.boxes), len(sample.labels)), (0, 0))
+            self.assertGreater(len(np.unique(sample.image)), 1)
+
     def test_some_samples_are_hard_ones(self):
         person = CutOut(np.full((200, 80, 3), 255, np.uint8), np.ones((200, 80), np.float32), True)
         room = Sample(Path("room"), np.zeros((90, 200, 3), np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
