@@ -259,9 +259,9 @@ class Compositor:
     def sample(self, rng: np.random.Generator) -> Sample:
         if self.hard and rng.random() < self.hard_share:
             return self.hard[rng.integers(len(self.hard))]
-        background = background_of(self.backgrounds[rng.integers(len(self.backgrounds))], self.width, self.height, rng)
+        background = self._background(rng)
         if rng.random() < 0.4:
-            background = clutter(background, [self.backgrounds[i].image for i in rng.integers(len(self.backgrounds), size=8)], rng)
+            background = self._cluttered(background, rng)
         people = [self.people[i] for i in rng.integers(len(self.people), size=rng.choice(4, p=[0.08, 0.37, 0.43, 0.12]))]
         near = np.sort(rng.random(len(people)) ** 0.7)
         if len(people) > 1 and rng.random() < 0.4:  # one close behind the other
@@ -273,7 +273,13 @@ class Compositor:
 
     def clutter_alone(self, rng: np.random.Generator) -> Sample:
         """Nobody: a background with one or two lots of clutter."""
-        image = background_of(self.backgrounds[rng.integers(len(self.backgrounds))], self.width, self.height, rng)
+        image = self._background(rng)
         for _ in range(rng.integers(1, 3)):
-            image = clutter(image, [self.backgrounds[i].image for i in rng.integers(len(self.backgrounds), size=8)], rng)
+            image = self._cluttered(image, rng)
         return Sample(Path("composite"), image, np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
+
+    def _background(self, rng: np.random.Generator) -> np.ndarray:
+        return background_of(self.backgrounds[rng.integers(len(self.backgrounds))], self.width, self.height, rng)
+
+    def _cluttered(self, image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        return clutter(image, [self.backgrounds[i].image for i in rng.integers(len(self.backgrounds), size=8)], rng)

@@ -14,35 +14,31 @@ import numpy as np
 
 from boxes import iou_matrix
 from dataset import DataError, Sample, read_folder
-from evaluate_boxes import read_rows
+from evaluate_boxes import area, read_rows
+from metrics import found_by
 
 HIT_OVERLAP = 0.5
 NEAR_OVERLAP = 0.3  # below it with everybody a box is on nobody: not only badly placed
 
 
-def is_missed(found: np.ndarray, boxes: np.ndarray, least_area: float, most_overlap: float) -> bool:
-    """Whether somebody has no box of their own (`found`, surest first) who is larger than `least_area` and whose box nobody else's overlaps
-    by more than `most_overlap`: of whom stands behind another one too little may be seen."""
-    overlap = iou_matrix(found, boxes)
-    free = np.ones(len(boxes), bool)
-    for row in overlap:
-        best = np.where(free, row, 0.0).argmax() if len(row) else 0
-        if len(row) and free[best] and row[best] >= HIT_OVERLAP:
-            free[best] = False
+def is_missed(rows: np.ndarray, boxes: np.ndarray, least_area: float, most_overlap: float) -> bool:
+    """Whether somebody has no box of their own (`rows`: N x 5, score and box) who is larger than `least_area` and whose box nobody else's
+    overlaps by more than `most_overlap`: of whom stands behind another one too little may be seen."""
+    missed = np.ones(len(boxes), bool)
+    hits = found_by(rows[:, 1:], rows[:, 0], boxes, HIT_OVERLAP)
+    missed[hits[hits >= 0]] = False
     among = iou_matrix(boxes, boxes)
     np.fill_diagonal(among, 0.0)
-    area = (boxes[:, 2:] - boxes[:, :2]).prod(1)
-    return bool((free & (area >= least_area) & (among.max(1, initial=0.0) <= most_overlap)).any())
+    return bool((missed & (area(boxes) >= least_area) & (among.max(1, initial=0.0) <= most_overlap)).any())
 
 
 def is_hard(sample: Sample, rows: np.ndarray, args: argparse.Namespace) -> bool:
     """`rows`: N x 5 (score, box)."""
-    rows = rows[np.argsort(-rows[:, 0], kind="stable")]
     nobody = iou_matrix(rows[:, 1:], sample.boxes).max(1, initial=0.0) < NEAR_OVERLAP
     if (nobody & (rows[:, 0] >= args.false_score)).any():
         return True
     height, width = sample.image.shape[:2]
-    return is_missed(rows[rows[:, 0] >= args.score, 1:], sample.boxes, args.least_share * height * width, args.most_overlap)
+    return is_missed(rows[rows[:, 0] >= args.score], sample.boxes, args.least_share * height * width, args.most_overlap)
 
 
 def main() -> int:

@@ -228,7 +228,7 @@ class Training:
         if not people or not backgrounds:
             raise DataError(f"composites need somebody who is cut out ({len(people)}) and images that show nobody ({len(backgrounds)})")
         print(f"composites of {len(people)} people and {len(backgrounds)} backgrounds", flush=True)
-        hard = [s for folder in self.args.hard_composites for s in read_folder(folder, 1, self.args.longest_side)]
+        hard = [s for folder in self.args.hard_composites for s in read_folder(folder, longest_side=self.args.longest_side)]
         return Compositor(people, backgrounds, hard=hard)
 
     def state(self) -> dict:

@@ -23,13 +23,13 @@ constexpr int kCell = 32;
 constexpr int kWidth = 3 * kCell;
 constexpr int kHeight = 2 * kCell;
 constexpr TimeNs kFrame = 33 * kNsPerMs;
+constexpr float kSteepness = 9;  // of a score's logit, from black to white
 
-/// For each cell of the image a box of its own size, the surer the brighter the cell: from sigmoid(-4.5) where it is black to
-/// sigmoid(4.5) where it is white.
+/// For each cell of the image a box of its own size, the surer the brighter the cell: its logit is 0 where that is
+/// half as bright as white.
 Network brightness_detector() {
   constexpr int kValues = 6;  // x, y, width, height, objectness, class
   constexpr std::size_t kPixels = 3 * kCell * kCell;
-  constexpr float kSteepness = 9;
   Convolution convolution;
   convolution.out_channels = kValues;
   convolution.kernel = kCell;
@@ -49,23 +49,23 @@ Network brightness_detector() {
 class PersonDetectorTest : public testing::Test {
  protected:
   PersonDetectorTest() {
-    const std::string file = (folder.path() / "brightness.posednet").string();
+    const std::string file = folder / "brightness.posednet";
     EXPECT_TRUE(write_network(brightness_detector(), WeightFormat::Float32, file));
     config.models = {file};
     frame.stamp_utc_ns = 1'700'000'000 * kNsPerSecond;
     frame.bgr = {pixels.data(), kWidth, kHeight, 3L * kWidth, 3};
   }
 
-  void make(double memory_s, double score) {
+  void make(double memory_s) {
     config.memory_s = memory_s;
-    config.score = score;
+    config.score = 0.4;
     detector = std::move(PersonDetector::create(config, kWidth, kHeight, clock).value());
   }
 
   /// What is found in the next frame, where a cell of column 0 to 2 in the upper row is so bright that its score is as given.
   std::vector<Detection> look(int column, float score) {
     std::fill(pixels.begin(), pixels.end(), std::uint8_t{0});
-    const float brightness = 0.5F + std::log(score / (1 - score)) / 9;
+    const float brightness = 0.5F + std::log(score / (1 - score)) / kSteepness;
     for (int row = 0; row < kCell; ++row) {
       std::fill_n(pixels.begin() + 3 * (row * kWidth + column * kCell), 3 * kCell,
                   static_cast<std::uint8_t>(std::lround(255 * brightness)));
@@ -87,7 +87,7 @@ class PersonDetectorTest : public testing::Test {
 };
 
 TEST_F(PersonDetectorTest, ReportsAnUnsureBoxOfWhoWasSurelySeen) {
-  make(1.0, 0.4);
+  make(1.0);
   ASSERT_EQ(look(1, 0.9F).size(), 1U);
   const std::vector<Detection> found = look(1, 0.25F);  // too little by itself
   ASSERT_EQ(found.size(), 1U);
@@ -96,21 +96,21 @@ TEST_F(PersonDetectorTest, ReportsAnUnsureBoxOfWhoWasSurelySeen) {
 }
 
 TEST_F(PersonDetectorTest, ReportsNoUnsureBoxOfWhoWasNot) {
-  make(1.0, 0.4);
+  make(1.0);
   EXPECT_TRUE(look(1, 0.25F).empty());
   ASSERT_EQ(look(1, 0.9F).size(), 1U);
   EXPECT_TRUE(look(2, 0.25F).empty()) << "there nobody was";
 }
 
 TEST_F(PersonDetectorTest, WithoutAMemoryEachImageIsByItself) {
-  make(0.0, 0.4);
+  make(0.0);
   ASSERT_EQ(look(1, 0.9F).size(), 1U);
   EXPECT_TRUE(look(1, 0.25F).empty());
 }
 
 TEST_F(PersonDetectorTest, AFrameThatIsGivenUpSaysNothingAndLeavesTheMemoryAsItWas) {
   config.budget_s = 0;  // spent before the first step
-  make(1.0, 0.4);
+  make(1.0);
   ASSERT_EQ(look(1, 0.9F).size(), 1U);
   for (int given_up = 0; given_up < 6; ++given_up) {  // had they shown nobody, the person would be forgotten
     frame.stamp_utc_ns += kFrame;
@@ -124,7 +124,7 @@ TEST_F(PersonDetectorTest, AFrameThatIsGivenUpSaysNothingAndLeavesTheMemoryAsItW
 }
 
 TEST_F(PersonDetectorTest, NamesTheModelThatIsMissing) {
-  config.models = {(folder.path() / "nobody.posednet").string()};
+  config.models = {folder / "nobody.posednet"};
   const auto refused = PersonDetector::create(config, kWidth, kHeight, clock);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::InvalidConfig);

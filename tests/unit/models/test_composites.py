@@ -182,10 +182,14 @@ class CutOuts(unittest.TestCase):
             self.assertTrue(0 < (cover == 0).mean() < 0.7)
 
 
+def empty_room(grey: int) -> Sample:
+    return Sample(Path("room"), np.full((90, 200, 3), grey, np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
+
+
 class Compositors(unittest.TestCase):
     def test_samples_show_what_their_boxes_say(self):
         person = CutOut(np.full((200, 80, 3), 255, np.uint8), np.ones((200, 80), np.float32), True)
-        room = Sample(Path("room"), np.zeros((90, 200, 3), np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
+        room = empty_room(0)
         compositor = Compositor([person], [room], 160, 120)
         counts = set()
         for seed in range(60):
@@ -201,7 +205,7 @@ class Compositors(unittest.TestCase):
         np.testing.assert_array_equal(again.image, sample.image)
 
     def test_clutter_alone_shows_nobody_and_no_room_as_it_was(self):
-        rooms = [Sample(Path("room"), np.full((90, 200, 3), grey, np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32)) for grey in (0, 80, 160, 240)]
+        rooms = [empty_room(grey) for grey in (0, 80, 160, 240)]
         compositor = Compositor([], rooms, 160, 120)
         for seed in range(5):
             sample = compositor.clutter_alone(np.random.default_rng(seed))
@@ -211,7 +215,7 @@ class Compositors(unittest.TestCase):
 
     def test_some_samples_are_hard_ones(self):
         person = CutOut(np.full((200, 80, 3), 255, np.uint8), np.ones((200, 80), np.float32), True)
-        room = Sample(Path("room"), np.zeros((90, 200, 3), np.uint8), np.zeros(0, np.int64), np.zeros((0, 4), np.float32))
+        room = empty_room(0)
         compositor = Compositor([person], [room], 160, 120, hard=[replace(room, path=Path("hard"))], hard_share=0.5)
         hard = sum(compositor.sample(np.random.default_rng(seed)).path == Path("hard") for seed in range(100))
         self.assertTrue(30 < hard < 70, hard)
