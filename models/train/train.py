@@ -196,7 +196,7 @@ class Training:
                             f"{self.settings.width_px}x{self.settings.height_px}")
         self.samples = [s for folder in args.data for s in read_folder(folder, options.classes, args.longest_side)]
         self.valid = read_folder(args.valid, options.classes) if args.valid else []
-        self.compositor = self.read_compositor() if args.cut_outs else None
+        self.compositor = self.read_compositor() if args.cut_outs or args.hard_composites else None
         self.device = torch.device(args.device)
         self.network = Yolo(options)
         if saved:

@@ -88,6 +88,10 @@ class Resuming(WithImages):
         weights = read_checkpoint(self.path / "parts" / "checkpoint.pt")["network"]
         self.assertTrue(all(torch.isfinite(value).all() for value in weights.values()))
 
+    def test_hard_composites_without_people_are_refused(self):
+        with self.assertRaisesRegex(DataError, r"somebody who is cut out \(0\)"):
+            self.training("run", "--hard-composites", str(self.path / "data"))
+
     def test_a_missing_folder_is_an_error_of_the_data(self):
         with self.assertRaisesRegex(DataError, "no such folder"):
             Training(parse_arguments(["--data", str(self.path / "absent"), "--out", str(self.path / "x")]))
