@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Keeps those composites (make_composites.py) that a detector gets wrong, to train on more often than on the others.
 
-Wrong are images in which it misses somebody who can well be seen, or finds somebody where nobody is. Negatives chosen so are those of
-Sung and Poggio, "Example-based learning for view-based human face detection", PAMI 1998, section 3.4 ("bootstrap").
+Wrong are images in which it misses somebody who can well be seen, or finds somebody where nobody is, or surely finds somebody a second
+time, or in the wrong place. Negatives chosen so are those of Sung and Poggio, "Example-based learning for view-based human face
+detection", PAMI 1998, section 3.4 ("bootstrap").
 """
 from __future__ import annotations
 
@@ -37,6 +38,9 @@ def is_hard(sample: Sample, rows: np.ndarray, args: argparse.Namespace) -> bool:
     nobody = iou_matrix(rows[:, 1:], sample.boxes).max(1, initial=0.0) < NEAR_OVERLAP
     if (nobody & (rows[:, 0] >= args.false_score)).any():
         return True
+    finds_nobody = found_by(rows[:, 1:], rows[:, 0], sample.boxes, HIT_OVERLAP) < 0
+    if (finds_nobody & (rows[:, 0] >= args.second_score)).any():
+        return True
     height, width = sample.image.shape[:2]
     return is_missed(rows[rows[:, 0] >= args.score], sample.boxes, args.least_share * height * width, args.most_overlap)
 
@@ -48,6 +52,7 @@ def main() -> int:
     parser.add_argument("out", type=Path, help="folder to copy the hard ones to")
     parser.add_argument("--score", type=float, default=0.3, help="from which on somebody is found")
     parser.add_argument("--false-score", type=float, default=0.2, help="from which on it is wrong to find nobody")
+    parser.add_argument("--second-score", type=float, default=0.4, help="from which on a second or displaced box on somebody is wrong")
     parser.add_argument("--least-share", type=float, default=0.03, help="of the image: smaller people may be missed")
     parser.add_argument("--most-overlap", type=float, default=0.55, help="people whose box another one overlaps by more may be missed")
     args = parser.parse_args()

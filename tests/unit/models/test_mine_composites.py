@@ -42,14 +42,14 @@ class Missed(unittest.TestCase):
 
 
 class Command(unittest.TestCase):
-    """Four images of one person at the left, as found by a detector."""
+    """Five images of one person at the left, as found by a detector."""
 
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
         self.root = Path(self.folder.name)
         (self.root / "all").mkdir()
-        for name in ("found", "missed", "invented", "displaced"):
+        for name in ("found", "missed", "invented", "displaced", "doubled"):
             cv2.imwrite(str(self.root / f"all/{name}.jpg"), np.zeros((120, 160, 3), np.uint8))
             (self.root / f"all/{name}.txt").write_text("0 0.25 0.5 0.25 0.5\n")  # 20 30 60 90
         cv2.imwrite(str(self.root / "all/empty.jpg"), np.zeros((120, 160, 3), np.uint8))
@@ -58,6 +58,7 @@ class Command(unittest.TestCase):
                                              "missed 0.25 20 30 60 90\n"
                                              "invented 0.9 20 30 60 90\ninvented 0.25 100 30 140 90\n"
                                              "displaced 0.25 30 40 80 110\ndisplaced 0.9 20 30 60 90\n"
+                                             "doubled 0.9 20 30 60 90\ndoubled 0.45 24 30 64 90\n"
                                              "empty 0.25 20 30 60 90\n")
 
     def run_it(self, *more: str) -> tuple[int, str]:
@@ -69,12 +70,12 @@ class Command(unittest.TestCase):
     def kept(self) -> list[str]:
         return sorted(p.name for p in (self.root / "hard").iterdir())
 
-    def test_keeps_images_with_somebody_missed_or_invented(self):
-        self.assertEqual(self.run_it(), (0, "3 of 5 are hard\n"))
-        self.assertEqual(self.kept(), ["empty.jpg", "invented.jpg", "invented.txt", "missed.jpg", "missed.txt"])
+    def test_keeps_images_with_somebody_missed_invented_or_doubled(self):
+        self.assertEqual(self.run_it(), (0, "4 of 6 are hard\n"))
+        self.assertEqual(self.kept(), ["doubled.jpg", "doubled.txt", "empty.jpg", "invented.jpg", "invented.txt", "missed.jpg", "missed.txt"])
 
     def test_by_the_scores_that_are_given(self):
-        self.run_it("--score", "0.2", "--false-score", "0.5")
+        self.run_it("--score", "0.2", "--false-score", "0.5", "--second-score", "0.5")
         self.assertEqual(self.kept(), [])
 
     def test_names_a_bad_line(self):
