@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "core/file_io.h"
 #include "detect/network_file.h"
 #include "detect/onnx_reader.h"
@@ -11,6 +13,10 @@
 namespace posed {
 
 Result<Network> NetworkLoader::load(const ModelName& name) {
+  if (name.sizes.size() > 1) {
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("{}: one size is wanted, not {}", to_string(name), name.sizes.size()));
+  }
   if (!network_ || file_ != name.file) {
     std::vector<std::uint8_t> bytes;
     if (const Status read = read_file(name.file, bytes); !read) {
@@ -23,7 +29,7 @@ Result<Network> NetworkLoader::load(const ModelName& name) {
     network_ = std::move(*network);
     file_ = name.file;
   }
-  return name.has_size() ? network_->with_input(name.width, name.height) : *network_;
+  return name.sizes.empty() ? *network_ : network_->with_input(name.sizes[0].width, name.sizes[0].height);
 }
 
 Result<Network> load_network(const ModelName& name) {

@@ -13,7 +13,8 @@ namespace posed {
 /// it read last, since the rungs of a ladder are mostly one network at several sizes. Thread-bound.
 class NetworkLoader {
  public:
-  /// Errors as in `read_network` (detect/network_file.h), `read_onnx` (detect/onnx_reader.h) and `Network::with_input`.
+  /// At most one size. Errors as in `read_network` (detect/network_file.h), `read_onnx` (detect/onnx_reader.h) and
+  /// `Network::with_input`; InvalidArgument, too, for several sizes.
   Result<Network> load(const ModelName& name);
 
  private:

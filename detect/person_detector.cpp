@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -49,7 +50,9 @@ constexpr bool kEightBitsAreFast = true;
 constexpr bool kEightBitsAreFast = false;
 #endif
 
-Result<std::unique_ptr<ObjectDetector>> load_own(const DetectorConfig& config, const ModelName& name, NetworkLoader& networks) {
+using Look = Result<std::shared_ptr<ObjectDetector>>;
+
+Look load_own(const DetectorConfig& config, const ModelName& name, NetworkLoader& networks) {
   Result<Network> network = networks.load(name);
   if (!network) {
     return tl::unexpected<Error>(network.error());
@@ -60,11 +63,11 @@ Result<std::unique_ptr<ObjectDetector>> load_own(const DetectorConfig& config, c
     return tl::unexpected<Error>(runner.error());
   }
   return ObjectDetector::create(std::move(*runner), network->metadata(), head_kind(config.head), config.person_class,
-                                thresholds(config));
+                                MultiScaleDetector::thresholds_of_looks(thresholds(config)));
 }
 
-Result<std::unique_ptr<ObjectDetector>> load_opencv(const DetectorConfig& config, const ModelName& name) {
-  if (name.has_size()) {
+Look load_opencv(const DetectorConfig& config, const ModelName& name) {
+  if (!name.sizes.empty()) {
     return make_error(ErrorCode::InvalidArgument,
                       fmt::format("{}: OpenCV takes networks at the size of their file", to_string(name)));
   }
@@ -72,19 +75,54 @@ Result<std::unique_ptr<ObjectDetector>> load_opencv(const DetectorConfig& config
   if (!engine) {
     return tl::unexpected<Error>(engine.error());
   }
-  return ObjectDetector::create(std::move(*engine), {}, head_kind(config.head), config.person_class, thresholds(config));
+  return ObjectDetector::create(std::move(*engine), {}, head_kind(config.head), config.person_class,
+                                MultiScaleDetector::thresholds_of_looks(thresholds(config)));
 }
 
-Result<std::unique_ptr<ObjectDetector>> load(const DetectorConfig& config, const ModelName& name, NetworkLoader& networks) {
-  return config.engine == DetectorEngine::Posed ? load_own(config, name, networks) : load_opencv(config, name);
-}
+/// Makes models of a configuration ready. Those that look at the same size of the same network share what is needed for it.
+class ModelLoader {
+ public:
+  explicit ModelLoader(const DetectorConfig& config) : config_(config) {}
+
+  Result<std::unique_ptr<MultiScaleDetector>> load(const ModelName& name) {
+    std::vector<std::shared_ptr<ObjectDetector>> looks;
+    for (const ModelName& single : one_by_one(name)) {
+      std::shared_ptr<ObjectDetector>& look = looks_[to_string(single)];
+      if (!look) {
+        Look loaded = config_.engine == DetectorEngine::Posed ? load_own(config_, single, networks_) : load_opencv(config_, single);
+        if (!loaded) {
+          return tl::unexpected<Error>(loaded.error());
+        }
+        look = std::move(*loaded);
+      }
+      looks.push_back(look);
+    }
+    return std::make_unique<MultiScaleDetector>(std::move(looks), thresholds(config_));
+  }
+
+ private:
+  static std::vector<ModelName> one_by_one(const ModelName& name) {
+    if (name.sizes.empty()) {
+      return {name};
+    }
+    std::vector<ModelName> single;
+    for (const InputSize& size : name.sizes) {
+      single.push_back({name.file, {size}});
+    }
+    return single;
+  }
+
+  const DetectorConfig& config_;
+  NetworkLoader networks_;
+  std::map<std::string, std::shared_ptr<ObjectDetector>> looks_;
+};
 
 /// Median of a few runs, the deadline far away.
-Result<TimeNs> measure(ObjectDetector& detector, ImageView<const std::uint8_t> bgr, const Clock& clock) {
+Result<TimeNs> measure(MultiScaleDetector& detector, ImageView<const std::uint8_t> bgr, const Clock& clock) {
   Detections found;
   std::vector<TimeNs> times;
   for (int i = 0; i < kWarmUpRuns + kTimedRuns; ++i) {
-    const Result<RunOutcome> outcome = detector.detect(bgr, Deadline{&clock}, found);
+    const Result<MultiScaleOutcome> outcome = detector.detect(bgr, Deadline{&clock}, found);
     if (!outcome) {
       return tl::unexpected<Error>(outcome.error());
     }
@@ -102,25 +140,24 @@ Error blame_config(const Error& error) {
 
 }  // namespace
 
-Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const ModelName& name) {
-  NetworkLoader networks;
-  return load(config, name, networks);
+Result<std::unique_ptr<MultiScaleDetector>> load_object_detector(const DetectorConfig& config, const ModelName& name) {
+  return ModelLoader(config).load(name);
 }
 
 Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorConfig& config, int image_width, int image_height,
                                                                const Clock& clock) {
   struct Loaded {
-    std::unique_ptr<ObjectDetector> model;
+    std::unique_ptr<MultiScaleDetector> model;
     std::string name;
     TimeNs unloaded_ns;
   };
   std::vector<std::uint8_t> grey(static_cast<std::size_t>(image_width) * static_cast<std::size_t>(image_height) * 3, 128);
   const ImageView<const std::uint8_t> bgr{grey.data(), image_width, image_height, std::ptrdiff_t{3} * image_width, 3};
   const DetectorConfig before = before_memory(config);
-  NetworkLoader networks;
+  ModelLoader loader(before);
   std::vector<Loaded> loaded;
   for (const std::string& file : config.models) {
-    Result<std::unique_ptr<ObjectDetector>> model = load(before, parse_model_name(file), networks);
+    Result<std::unique_ptr<MultiScaleDetector>> model = loader.load(parse_model_name(file));
     if (!model) {
       return tl::unexpected<Error>(blame_config(model.error()));
     }
@@ -133,7 +170,7 @@ Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorCon
   if (loaded.empty()) {
     return make_error(ErrorCode::InvalidConfig, "detector.models: is empty; name at least one, or set detector.enabled = false");
   }
-  std::vector<std::unique_ptr<ObjectDetector>> models;
+  std::vector<std::unique_ptr<MultiScaleDetector>> models;
   std::vector<std::string> names;
   std::vector<TimeNs> unloaded_ns;
   for (Loaded& l : loaded) {
@@ -147,7 +184,7 @@ Result<std::unique_ptr<PersonDetector>> PersonDetector::create(const DetectorCon
 }
 
 PersonDetector::PersonDetector(const DetectorConfig& config, const Clock& clock,
-                               std::vector<std::unique_ptr<ObjectDetector>> models, std::vector<std::string> names,
+                               std::vector<std::unique_ptr<MultiScaleDetector>> models, std::vector<std::string> names,
                                std::vector<TimeNs> unloaded_ns)
     : budget_ns_(from_seconds(config.budget_s)),
       least_score_(static_cast<float>(config.score)),
@@ -166,7 +203,7 @@ Result<DetectionOutcome> PersonDetector::detect(const RgbdFrame& frame, Detectio
   Result<DetectionOutcome> outcome = run(frame, model, {&clock_, clock_.now_ns() + budget_ns_}, found);
   if (outcome) {
     outcome->overrun_ns = std::max<TimeNs>(outcome->elapsed_ns - budget_ns_, 0);
-    if (outcome->finished) {
+    if (outcome->finished && !outcome->cut_short) {
       ladder_.record_finished(model, outcome->elapsed_ns);
     } else {
       ladder_.record_abandoned(model, outcome->elapsed_ns);
@@ -181,7 +218,7 @@ Result<DetectionOutcome> PersonDetector::detect_unhurried(const RgbdFrame& frame
 
 Result<DetectionOutcome> PersonDetector::run(const RgbdFrame& frame, std::size_t model, const Deadline& deadline,
                                              Detections& found) {
-  const Result<RunOutcome> outcome = models_[model]->detect(frame.bgr, deadline, found);
+  const Result<MultiScaleOutcome> outcome = models_[model]->detect(frame.bgr, deadline, found);
   if (!outcome) {
     return tl::unexpected<Error>(outcome.error());
   }
@@ -192,11 +229,12 @@ Result<DetectionOutcome> PersonDetector::run(const RgbdFrame& frame, std::size_t
   found.image_height = frame.bgr.height;
   found.detect_ns = outcome->elapsed_ns;
   found.model = static_cast<std::uint32_t>(model);
-  if (outcome->finished && memory_) {
+  const bool is_known = outcome->sizes_done > 0;
+  if (is_known && memory_) {
     memory_->judge(found);
     found.drop_below(least_score_);
   }
-  return DetectionOutcome{outcome->finished, model, outcome->elapsed_ns, 0, outcome->longest_step_ns};
+  return DetectionOutcome{is_known, model, outcome->elapsed_ns, 0, outcome->longest_step_ns, is_known && !outcome->finished};
 }
 
 }  // namespace posed

@@ -13,7 +13,7 @@
 #include "core/image_view.h"
 #include "core/result.h"
 #include "core/rgbd_frame.h"
-#include "detect/object_detector.h"
+#include "detect/multi_scale_detector.h"
 #include "detect/person_memory.h"
 #include "detect/rung_ladder.h"
 
@@ -26,11 +26,13 @@ struct DetectionOutcome {
   TimeNs elapsed_ns = 0;       ///< all of it
   TimeNs overrun_ns = 0;       ///< past the budget; 0 within it
   TimeNs longest_step_ns = 0;  ///< of this run: what bounds the overrun, but for what the scheduler adds
+  bool cut_short = false;      ///< finished, but the budget was spent before all sizes of the model were looked at
 };
 
 /// Finds people within a time budget: of the configured models it takes the largest that fits, and gives a frame up when the
-/// budget is spent. What a model says of a frame is judged by what was seen in those before (detect/person_memory.h), unless the
-/// configuration gives no memory. Thread-bound; everything is allocated by `create`.
+/// budget is spent; of a model that looks at several sizes, what the first ones show is kept. What a model says of a frame is
+/// judged by what was seen in those before (detect/person_memory.h), unless the configuration gives no memory. Thread-bound;
+/// everything is allocated by `create`.
 class PersonDetector {
  public:
   /// Loads the models and measures each on this machine, a few runs of a blank image of the given size. Errors: InvalidConfig,
@@ -51,7 +53,7 @@ class PersonDetector {
   TimeNs unloaded_ns(std::size_t model) const { return unloaded_ns_[model]; }
 
  private:
-  PersonDetector(const DetectorConfig& config, const Clock& clock, std::vector<std::unique_ptr<ObjectDetector>> models,
+  PersonDetector(const DetectorConfig& config, const Clock& clock, std::vector<std::unique_ptr<MultiScaleDetector>> models,
                  std::vector<std::string> names, std::vector<TimeNs> unloaded_ns);
   Result<DetectionOutcome> run(const RgbdFrame& frame, std::size_t model, const Deadline& deadline, Detections& found);
 
@@ -59,13 +61,13 @@ class PersonDetector {
   float least_score_;
   std::optional<PersonMemory> memory_;
   const Clock& clock_;
-  std::vector<std::unique_ptr<ObjectDetector>> models_;
+  std::vector<std::unique_ptr<MultiScaleDetector>> models_;
   std::vector<std::string> names_;
   std::vector<TimeNs> unloaded_ns_;
   RungLadder ladder_;
 };
 
 /// Makes one model ready as the configuration says: for tools that look at single images. Errors as in `PersonDetector::create`.
-Result<std::unique_ptr<ObjectDetector>> load_object_detector(const DetectorConfig& config, const ModelName& name);
+Result<std::unique_ptr<MultiScaleDetector>> load_object_detector(const DetectorConfig& config, const ModelName& name);
 
 }  // namespace posed

@@ -87,7 +87,7 @@ void draw_box(ImageView<std::uint8_t> bgr, const BoundingBox& box) {
 }
 
 /// The detector, and the file it runs.
-Result<std::pair<std::unique_ptr<ObjectDetector>, std::string>> load_model(const DetectOptions& options) {
+Result<std::pair<std::unique_ptr<MultiScaleDetector>, std::string>> load_model(const DetectOptions& options) {
   const Result<Config> config = options.config.empty() ? default_config() : load_config(options.config);
   if (!config) {
     return tl::unexpected<Error>(config.error());
@@ -100,7 +100,7 @@ Result<std::pair<std::unique_ptr<ObjectDetector>, std::string>> load_model(const
     return make_error(ErrorCode::InvalidConfig, "the configuration names no model; name one by --model");
   }
   const std::string name = options.model.empty() ? detector.models.back() : options.model;
-  Result<std::unique_ptr<ObjectDetector>> loaded = load_object_detector(detector, parse_model_name(name));
+  Result<std::unique_ptr<MultiScaleDetector>> loaded = load_object_detector(detector, parse_model_name(name));
   if (!loaded) {
     return tl::unexpected<Error>(loaded.error());
   }
@@ -161,7 +161,7 @@ int run_detect(const DetectOptions& options, const Console& console) {
       exit_code = report_error(console.err, read.error());  // the others are looked at all the same
       continue;
     }
-    if (const Result<RunOutcome> outcome = detector->detect(image.bgr(), Deadline{}, found); !outcome) {
+    if (const Result<MultiScaleOutcome> outcome = detector->detect(image.bgr(), Deadline{}, found); !outcome) {
       return report_error(console.err, outcome.error());
     }
     const std::string name = path.stem().string();
@@ -200,7 +200,8 @@ void add_detect_command(CLI::App& parent, const Console& console, int& exit_code
   command->add_option("--config", options->config,
                       "Configuration of the daemon, for its [detector]; built-in defaults unless given");
   command->add_option("--model", options->model,
-                      "Network, with @WIDTHxHEIGHT for another input than the file's; the last of detector.models unless given");
+                      "Network, with @WIDTHxHEIGHT for another input than the file's, or several joined by +; the last of "
+                      "detector.models unless given");
   command->add_option("--score", options->score, "Least confidence; that of the configuration unless given")
       ->check(CLI::Range(0.001, 0.999));
   command->add_option("--csv", options->csv,

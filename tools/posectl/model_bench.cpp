@@ -52,7 +52,7 @@ Status add_engine(Result<std::unique_ptr<Engine>> made, const ModelName& name, s
 
 Status add_engines(const ModelBenchRequest& request, const ModelName& name, std::vector<BenchEngine>& engines) {
   // OpenCV takes a network at the size of its file.
-  const bool by_opencv = request.against_opencv && !name.has_size() && std::filesystem::path(name.file).extension() == ".onnx";
+  const bool by_opencv = request.against_opencv && name.sizes.empty() && std::filesystem::path(name.file).extension() == ".onnx";
   const Result<Network> network = load_network(name);
   if (!network && network.error().code == ErrorCode::Unsupported && by_opencv) {
     return add_engine(OpenCvNetwork::create(name.file), name, engines);  // one of another kind, to compare with

@@ -135,9 +135,9 @@ TEST(NetworkFile, HoldsEveryOperation) {
 TEST(NetworkFile, LoadsEitherKind) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_network(test::small_network(), WeightFormat::Float32, folder / "n"));
-  EXPECT_TRUE(load_network({folder / "n"}));
-  EXPECT_TRUE(load_network({test::small_onnx_path()}));
-  EXPECT_EQ(load_network({folder / "missing"}).error().code, ErrorCode::NotFound);
+  EXPECT_TRUE(load_network({folder / "n", {}}));
+  EXPECT_TRUE(load_network({test::small_onnx_path(), {}}));
+  EXPECT_EQ(load_network({folder / "missing", {}}).error().code, ErrorCode::NotFound);
   const Result<Network> foreign = read_network(test::small_onnx_path());
   ASSERT_FALSE(foreign);
   EXPECT_THAT(foreign.error().message, HasSubstr("does not begin with 'POSEDNET'"));
@@ -149,15 +149,22 @@ TEST(NetworkLoader, ReadsAFileOnceForAllSizes) {
   const Network written = test::small_network();
   ASSERT_TRUE(write_network(written, WeightFormat::Float32, file));
   NetworkLoader networks;
-  const ModelName as_written{file};
-  const ModelName larger{file, 2 * written.input().width, written.input().height};
+  const ModelName as_written{file, {}};
+  const ModelName larger{file, {{2 * written.input().width, written.input().height}}};
   ASSERT_TRUE(networks.load(larger));
   std::filesystem::remove(file);
   EXPECT_EQ(networks.load(as_written).value().input(), written.input());
-  EXPECT_EQ(networks.load(larger).value().input().width, larger.width);
+  EXPECT_EQ(networks.load(larger).value().input().width, larger.sizes[0].width);
 
-  EXPECT_TRUE(networks.load({test::small_onnx_path()}));
+  EXPECT_TRUE(networks.load({test::small_onnx_path(), {}}));
   EXPECT_EQ(networks.load(as_written).error().code, ErrorCode::NotFound) << "only the file read last is kept";
+}
+
+TEST(NetworkLoader, ANetworkHasOneSize) {
+  const Result<Network> refused = load_network({"n", {{64, 64}, {32, 32}}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+  EXPECT_THAT(refused.error().message, HasSubstr("n@64x64+32x32: one size is wanted, not 2"));
 }
 
 TEST(NetworkFile, NoticesEveryTruncation) {

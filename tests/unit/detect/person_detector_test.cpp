@@ -1,6 +1,7 @@
 #include "detect/person_detector.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -121,6 +122,37 @@ TEST_F(PersonDetectorTest, AFrameThatIsGivenUpSaysNothingAndLeavesTheMemoryAsItW
     EXPECT_EQ(found.count, 0U);
   }
   EXPECT_EQ(look(1, 0.25F).size(), 1U);
+}
+
+/// Each time somebody looks at it, it is a millisecond later.
+class TickingClock final : public Clock {
+ public:
+  TimeNs now_ns() const noexcept override { return ticks_++ * kNsPerMs; }
+  void sleep_until(TimeNs) const override {}
+  std::int64_t utc_ns(TimeNs monotonic_ns) const noexcept override { return monotonic_ns; }
+
+ private:
+  mutable std::atomic<TimeNs> ticks_ = 0;
+};
+
+TEST_F(PersonDetectorTest, ABudgetThatIsSpentBetweenTwoSizesCutsTheLookShort) {
+  config.models.front() += "@96x64+192x128";
+  config.memory_s = 0;
+  const TickingClock ticking;
+  enum Fate { kGivenUp, kCutShort, kFinished };
+  std::vector<Fate> fates;
+  std::fill(pixels.begin(), pixels.end(), std::uint8_t{255});
+  for (int budget_ms = 1; budget_ms < 40; ++budget_ms) {
+    config.budget_s = 1e-3 * budget_ms;
+    detector = std::move(PersonDetector::create(config, kWidth, kHeight, ticking).value());
+    Detections found;
+    const auto outcome = detector->detect(frame, found);
+    ASSERT_TRUE(outcome);
+    EXPECT_EQ(outcome->finished, found.count > 0);
+    fates.push_back(!outcome->finished ? kGivenUp : outcome->cut_short ? kCutShort : kFinished);
+  }
+  EXPECT_TRUE(std::is_sorted(fates.begin(), fates.end()));
+  EXPECT_THAT(fates, testing::IsSupersetOf({kGivenUp, kCutShort, kFinished}));
 }
 
 TEST_F(PersonDetectorTest, NamesTheModelThatIsMissing) {
