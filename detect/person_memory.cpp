@@ -12,8 +12,9 @@ constexpr float kSureScore = 0.5F;
 constexpr float kSureOverlap = 0.3F;
 constexpr float kUnsureOverlap = 0.5F;
 constexpr float kRise = 1.5F;              // of the logarithm of the odds, for somebody who is surely seen just now
-constexpr float kUnsureWeight = 0.6F;      // of an unsure box, against the prediction, in where somebody is
-constexpr float kVelocityWeight = 0.4F;    // of the newest step in the velocity
+constexpr float kSureGain = 0.5F;          // of a sure box, against the prediction, in where somebody is
+constexpr float kUnsureGain = 0.3F;        // of an unsure one
+constexpr float kVelocityShare = 0.8F;     // of those, the gain of the velocity
 constexpr float kUnseenSlowdown = 0.8F;    // a frame
 constexpr TimeNs kUnseenNs = 170'000'000;  // after which somebody is forgotten: five frames at 30 Hz
 constexpr TimeNs kGapNs = 500'000'000;     // between two frames, after which everybody is
@@ -56,10 +57,10 @@ void PersonMemory::judge(Detections& found) {
     if (person_of_[i] != kNobody) {
       Person& person = people_[person_of_[i]];
       follow(person, detection, elapsed_s);
-      detection.score = with_odds_raised(detection.score, rise(person));
+      detection = {box_of(person.sides), with_odds_raised(detection.score, rise(person))};
     } else if (detection.score >= kSureScore && people_.size() < kMostPeople) {
       const Eigen::Array4f sides = sides_of(detection.box);
-      people_.push_back({sides, sides, Eigen::Array4f::Zero(), newest_ns_, newest_ns_, true});
+      people_.push_back({sides, Eigen::Array4f::Zero(), newest_ns_, newest_ns_, true});
     }
   }
   std::erase_if(people_, [this](const Person& p) { return newest_ns_ - p.seen_ns > kUnseenNs; });
@@ -76,24 +77,24 @@ void PersonMemory::predict(const Detections& found, float elapsed_s) {
       person.velocity *= kUnseenSlowdown;
     }
     person.is_met = false;
-    person.before = person.sides;
     person.sides = (person.sides + elapsed_s * person.velocity).max(-0.5F).min(largest - 0.5F);
   }
 }
 
-/// Of all pairs of a box and a person who are not matched yet, those that overlap most first.
+/// Of all pairs of a box and a person who are not matched yet, those that overlap most first, and of boxes in about the same place
+/// the surest: an unsure one that happens to lie better would take the person away from it.
 void PersonMemory::match(const Detections& found, float least_score, float least_overlap) {
   pairs_.clear();
   for (std::size_t i = 0; i < found.count; ++i) {
     for (std::size_t j = 0; j < people_.size() && found.people[i].score >= least_score; ++j) {
       const float overlap = intersection_over_union(found.people[i].box, box_of(people_[j].sides));
       if (overlap >= least_overlap) {
-        pairs_.push_back({overlap, i, j});
+        pairs_.push_back({overlap * std::sqrt(found.people[i].score), i, j});
       }
     }
   }
   std::sort(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) {
-    return std::tuple(-a.overlap, a.detection, a.person) < std::tuple(-b.overlap, b.detection, b.person);
+    return std::tuple(-a.strength, a.detection, a.person) < std::tuple(-b.strength, b.detection, b.person);
   });
   for (const Pair& pair : pairs_) {
     if (person_of_[pair.detection] == kNobody && !people_[pair.person].is_met) {
@@ -105,8 +106,10 @@ void PersonMemory::match(const Detections& found, float least_score, float least
 
 void PersonMemory::follow(Person& person, const Detection& detection, float elapsed_s) const {
   const bool is_sure = detection.score >= kSureScore;
-  person.sides += (is_sure ? 1.0F : kUnsureWeight) * (sides_of(detection.box) - person.sides);
-  person.velocity += kVelocityWeight * ((person.sides - person.before) / elapsed_s - person.velocity);
+  const float gain = is_sure ? kSureGain : kUnsureGain;
+  const Eigen::Array4f surprise = sides_of(detection.box) - person.sides;
+  person.sides += gain * surprise;
+  person.velocity += kVelocityShare * gain / elapsed_s * surprise;
   person.seen_ns = newest_ns_;
   person.surely_seen_ns = is_sure ? newest_ns_ : person.surely_seen_ns;
 }

@@ -17,8 +17,11 @@ namespace posed {
 /// a box that continues somebody rise by a factor, the less the longer ago they were surely seen.
 ///
 /// Sure boxes are matched to people first, by overlap with where those should be by now, then unsure ones to whoever is left
-/// (Zhang et al., "ByteTrack: multi-object tracking by associating every detection box", ECCV 2022; there no score changes). No box
-/// is moved, and none is made up where the network sees none. Does not allocate after construction. Thread-bound.
+/// (Zhang et al., "ByteTrack: multi-object tracking by associating every detection box", ECCV 2022; there no score changes). The
+/// sides of a box that continues somebody are a mean of the network's and of where they should be: of an alpha-beta filter
+/// (Benedict and Bordner, "Synthesis of an optimal set of radar track-while-scan smoothing equations", IRE Transactions on
+/// Automatic Control 7(4), 1962), since the network's boxes waver from frame to frame by more than people do. No box is made up
+/// where the network sees none. Does not allocate after construction. Thread-bound.
 class PersonMemory {
  public:
   static constexpr float kUnsureScore = 0.03F;  ///< a box below continues nobody
@@ -32,15 +35,14 @@ class PersonMemory {
 
  private:
   struct Person {
-    Eigen::Array4f before;    // sides of the box at the frame before, in the order of BoundingBox [pixels]
-    Eigen::Array4f sides;     // at the newest frame, whether seen there or not
+    Eigen::Array4f sides;     // at the newest frame, whether seen there or not, in the order of BoundingBox [pixels]
     Eigen::Array4f velocity;  // [pixels/s]
     std::int64_t seen_ns;
     std::int64_t surely_seen_ns;
     bool is_met;  // in the newest frame
   };
   struct Pair {
-    float overlap;
+    float strength;
     std::size_t detection;
     std::size_t person;
   };
