@@ -97,8 +97,8 @@ TEST(PersonMemory, MovesAnUnsureBoxMore) {
     stream.next({{person_at(100), 0.9F}});
     return 110 - stream.next({{person_at(110), score}})[0].box.x_min;
   };
-  EXPECT_FLOAT_EQ(moved_by(0.9F), 5);
-  EXPECT_FLOAT_EQ(moved_by(0.4F), 7);
+  EXPECT_FLOAT_EQ(moved_by(0.9F), 3);
+  EXPECT_FLOAT_EQ(moved_by(0.4F), 5);
 }
 
 TEST(PersonMemory, GivesAPersonToOneBox) {
