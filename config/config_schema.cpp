@@ -111,19 +111,23 @@ void add_detector(SchemaBuilder& schema, DetectorConfig& c) {
   constexpr std::size_t kMaxModels = 8;
   schema.section("detector", "The detector of people, which keeps to a time budget.")
       .key("enabled", BoolField{&c.enabled}, "", "Look for people.")
-      .key("models", TextListField{&c.models, {"the name of a file", is_file_name}, kMaxModels}, "",
-           "Networks, from cheap to costly: for each frame the largest whose 95 % quantile of the time fits `budget_s`. A relative "
-           "name is looked for beside this file, then in the folders of $POSED_MODEL_PATH, then among the shipped models. "
-           "`@WIDTHxHEIGHT` after it is the size of the images it is to look at [pixels], if not that of the file: the same network "
-           "for less, or more, time.")
+      .key(
+          "models", TextListField{&c.models, {"the name of a file", is_file_name}, kMaxModels}, "",
+          "Networks, from cheap to costly: for each frame the largest whose 95 % quantile of the time fits `budget_s`. A relative "
+          "name is looked for beside this file, then in the folders of $POSED_MODEL_PATH, then among the shipped models. "
+          "`@WIDTHxHEIGHT` after it is the size of the images it is to look at [pixels], if not that of the file: the same network "
+          "for less, or more, time. With several sizes, `@384x288+320x256`, it looks at each frame that often, and boxes and "
+          "confidences are joined.")
       .key("budget_s", real(c.budget_s, 0.001, 10.0), "s",
-           "A frame that takes longer is given up, and counted. Without effect in `lockstep`.")
+           "A frame that takes longer is given up, and counted; of several sizes, what those that were in time show is kept. "
+           "Without effect in `lockstep`.")
       .key("lockstep_model", integer(c.lockstep_model, 0, static_cast<int>(kMaxModels) - 1), "",
            "Which of `models`, counted from 0, looks in `lockstep`, where no clock may decide. The last one where there are fewer.")
       .key("score", real(c.score, 0.01, 0.99), "", "Boxes of less confidence are not reported.")
       .key("memory_s", real(c.memory_s, 0.0, 60.0), "s",
            "A box that continues somebody who was surely seen before is more likely right, so its confidence rises, by less the "
-           "longer ago that was; by half as much after about 0.7 of this time. 0: each image is judged by itself.")
+           "longer ago that was, by half as much after about 0.7 of this time, and its sides become a mean of the network's and of "
+           "where they should be. 0: each image is judged by itself.")
       .key("iou", real(c.iou, 0.05, 0.95), "",
            "Of two boxes that overlap by more (intersection over union), the less confident one goes.")
       .key("engine", choice(c.engine, {{"posed", DetectorEngine::Posed}, {"opencv", DetectorEngine::OpenCv}}), "",

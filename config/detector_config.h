@@ -17,7 +17,7 @@ struct DetectorConfig {
   bool enabled = true;
   /// config/model_name.h; from cheap to costly.
   std::vector<std::string> models{"person.posednet@192x160", "person.posednet@256x192", "person.posednet@320x256",
-                                  "person.posednet@384x288"};
+                                  "person.posednet@384x288", "person.posednet@384x288+320x256"};
   double budget_s = 0.033;  ///< after which a frame is given up (not in lockstep)
   int lockstep_model = 2;   ///< index into `models`, of the one that looks in lockstep
   double score = 0.4;       ///< least confidence
