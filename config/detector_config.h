@@ -20,7 +20,7 @@ struct DetectorConfig {
                                   "person.posednet@384x288", "person.posednet@384x288+320x256"};
   double budget_s = 0.033;  ///< after which a frame is given up (not in lockstep)
   int lockstep_model = 2;   ///< index into `models`, of the one that looks in lockstep
-  double score = 0.4;       ///< least confidence
+  double score = 0.34;      ///< least confidence
   double memory_s = 1.0;    ///< in which it fades that somebody was surely seen; 0: each image by itself
   double iou = 0.5;         ///< of two boxes that overlap by more, one goes
   DetectorEngine engine = DetectorEngine::Posed;
