@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <tuple>
 
 namespace posed {
 
@@ -28,11 +27,11 @@ void BoxFusion::add(const Detections& look, std::size_t looks_before, Detections
   std::array<bool, Detections::kCapacity> is_continued{};
   std::array<bool, Detections::kCapacity> is_known{};
   joined_.assign(fused.found().begin(), fused.found().end());
-  for (const Pair& pair : pairs_) {
-    if (!is_continued[pair.fused] && !is_known[pair.look]) {
-      is_continued[pair.fused] = is_known[pair.look] = true;
-      Detection& person = joined_[pair.fused];
-      const Detection& seen = look.people[pair.look];
+  for (const auto& [strength, i, j] : pairs_) {
+    if (!is_continued[i] && !is_known[j]) {
+      is_continued[i] = is_known[j] = true;
+      Detection& person = joined_[i];
+      const Detection& seen = look.people[j];
       person.box = between(person.box, seen.box, seen.score / (before * person.score + seen.score));
       person.score += seen.score / before;  // the sum of all looks, as of those not seen anew, over `before`
     }
@@ -48,7 +47,7 @@ void BoxFusion::add(const Detections& look, std::size_t looks_before, Detections
   for (Detection& person : joined_) {
     person.score *= before / (before + 1);
   }
-  std::stable_sort(joined_.begin(), joined_.end(), [](const Detection& a, const Detection& b) { return a.score > b.score; });
+  order_by_confidence(joined_);
   fused.assign(joined_);
 }
 
@@ -63,9 +62,7 @@ void BoxFusion::list_pairs(const Detections& look, const Detections& fused) {
       }
     }
   }
-  std::sort(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) {
-    return std::tuple(-a.strength, a.fused, a.look) < std::tuple(-b.strength, b.fused, b.look);
-  });
+  order_by_strength(pairs_);
 }
 
 }  // namespace posed

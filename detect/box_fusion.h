@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/detections.h"
+#include "detect/box_pairs.h"
 
 namespace posed {
 
@@ -23,16 +24,10 @@ class BoxFusion {
   void add(const Detections& look, std::size_t looks_before, Detections& fused);
 
  private:
-  struct Pair {
-    float strength;
-    std::size_t fused;
-    std::size_t look;
-  };
-
   void list_pairs(const Detections& look, const Detections& fused);
 
   float iou_;
-  std::vector<Pair> pairs_;
+  std::vector<BoxPair> pairs_;  // of a box fused so far and one of the look
   std::vector<Detection> joined_;
 };
 

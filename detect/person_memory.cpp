@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <span>
 
 namespace posed {
 
@@ -64,8 +64,7 @@ void PersonMemory::judge(Detections& found) {
     }
   }
   std::erase_if(people_, [this](const Person& p) { return newest_ns_ - p.seen_ns > kUnseenNs; });
-  std::stable_sort(found.people.begin(), found.people.begin() + found.count,
-                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
+  order_by_confidence(std::span(found.people).first(found.count));
 }
 
 /// Where everybody should be by now, if they went on as they did.
@@ -93,13 +92,11 @@ void PersonMemory::match(const Detections& found, float least_score, float least
       }
     }
   }
-  std::sort(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) {
-    return std::tuple(-a.strength, a.detection, a.person) < std::tuple(-b.strength, b.detection, b.person);
-  });
-  for (const Pair& pair : pairs_) {
-    if (person_of_[pair.detection] == kNobody && !people_[pair.person].is_met) {
-      person_of_[pair.detection] = pair.person;
-      people_[pair.person].is_met = true;
+  order_by_strength(pairs_);
+  for (const auto& [strength, i, j] : pairs_) {
+    if (person_of_[i] == kNobody && !people_[j].is_met) {
+      person_of_[i] = j;
+      people_[j].is_met = true;
     }
   }
 }

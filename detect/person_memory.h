@@ -9,6 +9,7 @@
 
 #include "core/clock.h"
 #include "core/detections.h"
+#include "detect/box_pairs.h"
 
 namespace posed {
 
@@ -41,11 +42,6 @@ class PersonMemory {
     std::int64_t surely_seen_ns;
     bool is_met;  // in the newest frame
   };
-  struct Pair {
-    float strength;
-    std::size_t detection;
-    std::size_t person;
-  };
   static constexpr std::size_t kMostPeople = Detections::kCapacity;
   static constexpr std::size_t kNobody = kMostPeople;
 
@@ -57,7 +53,7 @@ class PersonMemory {
   TimeNs memory_ns_;
   std::int64_t newest_ns_ = 0;
   std::vector<Person> people_;
-  std::vector<Pair> pairs_;
+  std::vector<BoxPair> pairs_;                                  // of a detection and one of people_
   std::array<std::size_t, Detections::kCapacity> person_of_{};  // of each detection
 };
 
