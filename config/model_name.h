@@ -18,7 +18,7 @@ struct InputSize {
 /// "person.posednet@384x288+320x256", which looks at each image twice. Reentrant.
 struct ModelName {
   std::string file;
-  std::vector<InputSize> sizes;  ///< none: as the file says
+  std::vector<InputSize> sizes = {};  ///< none: as the file says, and as `{file}` alone means
 
   friend bool operator==(const ModelName&, const ModelName&) = default;
 };
